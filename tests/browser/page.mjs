@@ -71,9 +71,6 @@ try {
   await browser.click("#events li:last-child button");
   check(Math.abs(await time() - await browser.evaluate("page.events.at(-1)[0]")) < 1e-3, "an event is a place to go to");
 
-  await browser.evaluate("page.seek(0), page.play(true)");
-  const frames = await browser.evaluate("new Promise((done) => { let n = 0; const t = performance.now(); const f = (now) => { n++; now - t > 2000 ? done(n / ((now - t) / 1000)) : requestAnimationFrame(f); }; requestAnimationFrame(f); })");
-  console.log(`frames a second while playing: ${frames.toFixed(1)}`);
   await browser.resize(400, 800);
   await pause(300);
   check(await browser.evaluate("document.documentElement.scrollWidth <= 400"), "nothing is wider than a narrow screen");

@@ -341,7 +341,7 @@ fn commission_on_broken_line(intact: usize, break_: Break) {
 }
 
 /// Lines that break, of either command.
-const BROKEN_LINES: usize = 16;
+const BROKEN_LINES: usize = 8;
 
 #[test]
 fn drive_and_commission_end_in_time_when_the_line_breaks_at_any_byte() {
@@ -362,14 +362,12 @@ fn drive_and_commission_end_in_time_when_the_line_breaks_at_any_byte() {
             (drive, commission, breaks[index % breaks.len()])
         })
         .collect();
-    for cuts in cuts.chunks(8) {
-        std::thread::scope(|scope| {
-            for (drive, commission, break_) in cuts {
-                scope.spawn(|| drive_on_broken_line(*drive, *break_));
-                scope.spawn(|| commission_on_broken_line(*commission, *break_));
-            }
-        });
-    }
+    std::thread::scope(|scope| {
+        for (drive, commission, break_) in cuts {
+            scope.spawn(move || drive_on_broken_line(drive, break_));
+            scope.spawn(move || commission_on_broken_line(commission, break_));
+        }
+    });
 }
 
 /// Opens a port as another user's program would that knows nothing of locks.
@@ -431,22 +429,26 @@ fn a_port_in_use_is_refused_by_every_command_and_its_user_is_not_disturbed() {
 
 #[test]
 fn bytes_that_are_no_frames_are_told_from_silence() {
-    for (break_, told) in [(Break::Garbage, true), (Break::Silence, false)] {
-        let board = Board::new(0, break_);
-        let bench = Bench::new("garbage");
-        for arguments in [
-            &["drive", "--no-record"][..],
-            &["drive", "--stored"],
-            &["commission"],
-            &["timing", "hybrid-elbow-down", "--host", "serial"],
-            &["run", "--host", "serial", "--no-record", "--no-plot"],
-        ] {
-            let (output, _) = output(board.start(&bench, arguments));
-            let text = errors(&output);
-            assert_eq!(output.status.code(), Some(3), "{arguments:?}: {text}");
-            assert!(text.contains("the board has not answered for 1."), "{text}");
-            let is_told = text.contains(" bytes, none of them a frame: wrong baud rate");
-            assert_eq!(is_told, told, "{arguments:?}: {text}");
+    let start = |arguments: &[&str], break_| {
+        let (board, bench) = (Board::new(0, break_), Bench::new("garbage"));
+        let (output, _) = output(board.start(&bench, arguments));
+        let text = errors(&output);
+        assert_eq!(output.status.code(), Some(3), "{arguments:?}: {text}");
+        assert!(text.contains("the board has not answered for 1."), "{text}");
+        let is_told = text.contains(" bytes, none of them a frame: wrong baud rate");
+        assert_eq!(is_told, break_ == Break::Garbage, "{arguments:?}: {text}");
+    };
+    std::thread::scope(|scope| {
+        for break_ in [Break::Garbage, Break::Silence] {
+            for arguments in [
+                &["drive", "--no-record"][..],
+                &["drive", "--stored"],
+                &["commission"],
+                &["timing", "hybrid-elbow-down", "--host", "serial"],
+                &["run", "--host", "serial", "--no-record", "--no-plot"],
+            ] {
+                scope.spawn(move || start(arguments, break_));
+            }
         }
-    }
+    });
 }

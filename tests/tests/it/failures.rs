@@ -182,7 +182,7 @@ fn one_of_several_simultaneous_runs_succeeds() {
         "20",
     ];
     let hash = bench.report(&[&["run", "--set", "run.duration_s=200"], &short[..]].concat());
-    let rounds = std::env::var("PAINLEVE_ROUNDS").map_or(4, |rounds| rounds.parse().unwrap());
+    let rounds = std::env::var("PAINLEVE_ROUNDS").map_or(3, |rounds| rounds.parse().unwrap());
     for round in 0..rounds {
         let count = 2 + round % 4;
         let barrier = Barrier::new(count);

@@ -6,7 +6,7 @@ use painleve_shared::Posture;
 use crate::arms::{Rig, limits};
 
 const FIRST_SEED: u64 = 34_000;
-const ARMS: u64 = 100;
+const ARMS: u64 = 40;
 
 #[test]
 fn healthy_arms_are_identified_to_the_limit_and_errors_are_within_three_deviations() {

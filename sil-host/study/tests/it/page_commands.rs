@@ -27,8 +27,8 @@ fn lines(csv: &[u8]) -> Vec<String> {
 fn every_printed_command_reproduces_the_rows_of_its_section() {
     // Equal rows require equal arguments, not long runs.
     let short = Fineness {
-        open_loop_s: [5.0, 2.0],
-        closed_loop_s: [1.0, 0.5],
+        open_loop_s: [1.0, 0.5],
+        closed_loop_s: [0.4, 0.2],
         scan_step_m: 0.2,
         ..Fineness::DRAFT
     };

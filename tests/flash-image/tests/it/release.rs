@@ -12,7 +12,7 @@ use painleve_tests::printed::{self, LastFigure};
 use crate::bound::flashed;
 use crate::bound::random::Random;
 
-const TICKS: u32 = 1000;
+const TICKS: u32 = 300;
 
 /// With two sensors on each channel, while the host asks for the board's health and its black box at random times. At 5 kHz the
 /// sensors are still being read when the next tick is due.

@@ -85,7 +85,6 @@ fn nothing_is_found<C: BoardChip>(boards: u64) {
 #[test]
 fn a_healthy_board_is_accepted() {
     nothing_is_found::<F405>(1);
-    nothing_is_found::<G474>(1);
 }
 
 fn every_defect_is_found<C: BoardChip>() {

@@ -112,7 +112,7 @@ fn a_control_timer_that_stops_takes_the_torque_off<C: BoardChip>() {
         board.machine.run_for(20 * MILLISECOND);
         let mut bench = Bench::<C>::with_board(&scenario(DEFAULT), board);
         bench.drive();
-        for _ in 0..500 {
+        for _ in 0..100 {
             bench.tick();
         }
         assert_eq!(bench.board.resets(), [], "fed in time");
