@@ -31,7 +31,7 @@ pub fn own_firmware() -> Result<(), ChoreError> {
 }
 
 fn own_firmware_for(chips: &[(&str, &str)]) -> Result<(), ChoreError> {
-    let manifest = ["--manifest-path", OWN_FIRMWARE];
+    let manifest = ["--locked", "--manifest-path", OWN_FIRMWARE];
     for &(chip, part) in chips {
         build_fw::build(
             chip,
@@ -54,7 +54,7 @@ pub fn run() -> Result<(), ChoreError> {
     own_firmware_for(&CHIPS)?;
     for manifest in manifests()? {
         let manifest_path = manifest.to_string_lossy();
-        let of_example = ["--release", "--manifest-path", &manifest_path];
+        let of_example = ["--locked", "--release", "--manifest-path", &manifest_path];
         for image in images(&manifest)? {
             let selection = [&of_example[..], &["--bin", &image]].concat();
             build_fw::build(build_fw::TARGET, &selection, TARGET, "release", &[&image])?;
