@@ -142,8 +142,13 @@ const CONTROLLER_END: Duration = Duration::from_millis(1700);
 /// Time for a bridge to end after the plant has reported it missing.
 const BRIDGE_END: Duration = Duration::from_millis(300);
 
-/// Runs a scenario that is watched and steered from a page.
-fn live(arguments: &RunArguments, scenario: &Scenario, port: u16) -> Result<(), CommandError> {
+/// Runs a scenario that is watched and steered from a page; `command` runs it, too.
+fn live(
+    arguments: &RunArguments,
+    scenario: &Scenario,
+    command: String,
+    port: u16,
+) -> Result<(), CommandError> {
     if arguments.host != Host::Native {
         return Err(InputError::LiveHost.into());
     }
@@ -152,7 +157,8 @@ fn live(arguments: &RunArguments, scenario: &Scenario, port: u16) -> Result<(), 
         false => Some(Token::draw()?),
     };
     let interrupt = Interrupt::catch()?;
-    live::run(scenario, port, token, &arguments.live_origin, &interrupt)
+    let origins = &arguments.live_origin;
+    live::run(scenario, command, port, token, origins, &interrupt)
 }
 
 impl RunArguments {
@@ -175,13 +181,15 @@ impl RunArguments {
 /// [`CommandError`] if an option is invalid, a process of the run fails, or a condition of `--fail-on` is met.
 pub fn run(arguments: &RunArguments) -> Result<(), CommandError> {
     let mut arguments = arguments.clone();
+    // As it was given: the copy of standard input does not outlive the run.
+    let command = arguments.scenario.command();
     let _standard_input = arguments.scenario.copy_standard_input()?;
     let arguments = &arguments;
     // Validate before any process starts, so that an error is reported once.
     let scenario = arguments.scenario.load()?;
     arguments.check_options()?;
     if let Some(port) = arguments.live {
-        return live(arguments, &scenario, port);
+        return live(arguments, &scenario, command, port);
     }
     if arguments.host == Host::Qemu {
         // From now on it is known as an input.

@@ -2,7 +2,7 @@
 
 use std::io::Read;
 
-use clap::Args;
+use clap::{Args, ValueEnum};
 use painleve_files::input_file;
 use painleve_link::Pacing;
 use painleve_plant::scenario::{Scenario, built_in};
@@ -84,6 +84,21 @@ impl ScenarioArguments {
         }
     }
 
+    /// Returns the shell command that runs this scenario.
+    pub fn command(&self) -> String {
+        let mut command = String::from("painleve run");
+        match self.replay {
+            Some(Replay { seed, index }) => {
+                let arms = self.arms.to_possible_value();
+                let arms = arms.as_ref().map_or("", |arms| arms.get_name());
+                command += &format!(" --replay {seed}:{index} --arms {arms}");
+            }
+            None => command += &format!(" {}", quoted(self.name())),
+        }
+        command.extend(self.overrides.iter().map(|text| set_option(text)));
+        command
+    }
+
     /// Copies a scenario from standard input, if it is requested as `-`, to a file that every process
     /// of the run can read, and which lasts as long as the returned handle.
     ///
@@ -104,4 +119,15 @@ impl ScenarioArguments {
         self.option = Some(file.path().display().to_string());
         Ok(Some(file))
     }
+}
+
+/// Returns the option that overrides a key, for a shell, on a line of its own.
+pub fn set_option(text: &str) -> String {
+    format!(" \\\n    --set {}", quoted(text))
+}
+
+/// Returns a text as one word of a shell.
+fn quoted(text: &str) -> String {
+    // A single quote ends the shell's quotation.
+    format!("'{}'", text.replace('\'', "'\\''"))
 }

@@ -33,12 +33,13 @@ const ROWS_PER_S: f64 = 2000.0;
 const STATUS_INTERVAL: Duration = Duration::from_millis(250);
 
 /// Serves a run that goes on until it is interrupted, to its page and to Foxglove, for those who know the token;
-/// pages of `origins` may connect as Foxglove does.
+/// pages of `origins` may connect as Foxglove does. `command` is the command that runs the scenario.
 ///
 /// # Errors
 /// [`CommandError`] if the page cannot be served or the scenario cannot start.
 pub fn run(
     scenario: &Scenario,
+    command: String,
     port: u16,
     token: Option<Token>,
     origins: &[String],
@@ -48,7 +49,7 @@ pub fn run(
     page["parameters"] = page_settings::settings(scenario);
     let server = Server::start(port, html(&page), token, origins)
         .map_err(|source| InputError::Port { port, source })?;
-    let mut live = Live::new(scenario.clone(), server.hub.clone())?;
+    let mut live = Live::new(scenario.clone(), command, server.hub.clone())?;
     warn(format_args!(
         "open {} in a browser or {} in Foxglove; the run starts with the first viewer and ends with Ctrl-C",
         server.page_address(),
@@ -68,6 +69,8 @@ pub fn run(
 
 /// A run that can be steered.
 struct Live {
+    /// The command that runs the scenario as it was given.
+    command: String,
     /// The scenario as it was given.
     given: Scenario,
     /// The scenario with what was set.
@@ -100,12 +103,13 @@ struct Clock {
 }
 
 impl Live {
-    fn new(scenario: Scenario, hub: Arc<Hub>) -> Result<Self, CommandError> {
+    fn new(scenario: Scenario, command: String, hub: Arc<Hub>) -> Result<Self, CommandError> {
         let viewers = Viewers::new(&scenario, hub.clone());
         let now = Instant::now();
         let live = Self {
             closed_loop: start(&scenario, &viewers)?,
             running: scenario.clone(),
+            command,
             given: scenario.clone(),
             scenario,
             viewers,
@@ -201,7 +205,7 @@ impl Live {
     fn describe(&self) {
         let mut run = description(&self.running);
         run["settings"] = self.scenario.to_brief_toml().into();
-        run["changes"] = page_settings::changes(&self.given, &self.scenario).into();
+        run["changes"] = page_settings::changes(&self.command, &self.given, &self.scenario).into();
         self.hub.describe(&run);
     }
 

@@ -4,6 +4,8 @@ use painleve_plant::decimal::as_written;
 use painleve_plant::scenario::Scenario;
 use serde_json::{Value, json};
 
+use crate::scenario::set_option;
+
 /// Settings of the hybrid law: key, label, largest value.
 const HYBRID: [(&str, &str, f64); 3] = [
     ("normal_force_n", "normal force f_n*, N", 100.0),
@@ -30,33 +32,83 @@ pub fn settings(scenario: &Scenario) -> Value {
     settings.into()
 }
 
-/// Returns the command that runs a scenario with what was set in a live run, one key on each line.
-pub fn changes(given: &Scenario, set: &Scenario) -> String {
+/// Returns the command that runs a scenario with what was set in a live run, one key on each line. `command` runs it
+/// as it was `given`.
+pub fn changes(command: &str, given: &Scenario, set: &Scenario) -> String {
     // Nothing that is set makes another key absent, except the other way to give the start.
     let options = given.differences(set).into_iter().filter_map(|change| {
-        // A single quote ends the shell's quotation.
-        let value = change.second?.replace('\'', "'\\''");
-        Some(format!(" \\\n    --set '{}={value}'", change.key))
+        let value = change.second?;
+        Some(set_option(&format!("{}={value}", change.key)))
     });
-    format!(
-        "painleve run {}{}\n",
-        given.name,
-        options.collect::<String>()
-    )
+    format!("{command}{}\n", options.collect::<String>())
 }
 
 #[cfg(test)]
 mod tests {
+    use std::fs;
+    use std::process::Command;
+
+    use clap::Parser;
+
     use super::*;
+    use crate::scenario::ScenarioArguments;
+
+    /// The options of `painleve run` that say what runs.
+    #[derive(Parser)]
+    struct Line {
+        #[command(flatten)]
+        scenario: ScenarioArguments,
+    }
+
+    /// Returns the words after `painleve` that a shell makes of a command.
+    fn words(command: &str) -> Vec<String> {
+        let script = format!("painleve() {{ printf '%s\\0' \"$@\"; }}\n{command}");
+        let output = Command::new("sh").args(["-c", &script]).output().unwrap();
+        assert!(output.status.success() && output.stderr.is_empty());
+        let text = String::from_utf8(output.stdout).unwrap();
+        text.split_terminator('\0').map(str::to_owned).collect()
+    }
 
     #[test]
-    fn changes_are_a_command() {
-        let given = Scenario::load("edge", &[]).unwrap();
-        let set = ["belt.friction=0.35", "controller.law=pid"].map(str::to_owned);
-        let set = given.clone().with_overrides("edge", &set).unwrap();
-        let command = "painleve run edge \\\n    --set 'belt.friction=0.35' \\\n    --set 'controller.law={ pid = {} }'\n";
-        assert_eq!(changes(&given, &set), command);
-        assert_eq!(changes(&given, &given), "painleve run edge\n");
+    fn the_saved_command_runs_what_runs() {
+        let folder = tempfile::tempdir().unwrap();
+        // An edited copy, whose name and path would do harm if a shell read them.
+        let harm = format!("it's $(touch {0}/a); touch {0}/b", folder.path().display());
+        let copy = folder.path().join("it's $(exit 1).toml");
+        let text = format!("name = \"{harm}\"\nbelt.friction = 0.41\n");
+        fs::write(&copy, text).unwrap();
+        let overridden = ["edge", "--set", "belt.friction=0.3", "--set", "run.seed=7"];
+        for arguments in [
+            &["edge"][..],
+            &overridden,
+            &["--scenario", copy.to_str().unwrap()],
+            &[
+                "--replay",
+                "3:5",
+                "--arms",
+                "general",
+                "--set",
+                "run.seed=8",
+            ],
+        ] {
+            let read = |arguments: &[String]| {
+                let arguments = arguments.iter().map(String::as_str);
+                Line::try_parse_from([""].into_iter().chain(arguments)).unwrap()
+            };
+            let arguments: Vec<String> = arguments.iter().map(ToString::to_string).collect();
+            let started = read(&arguments).scenario;
+            let given = started.load().unwrap();
+            let set = ["run.seed=9", "controller.law=pid"].map(str::to_owned);
+            let set = given.clone().with_overrides("live", &set).unwrap();
+            for running in [&given, &set] {
+                let command = changes(&started.command(), &given, running);
+                let words = words(&command);
+                assert_eq!(words[0], "run");
+                let again = read(&words[1..]).scenario.load().unwrap();
+                assert_eq!(&again, running, "{command}");
+            }
+        }
+        assert_eq!(fs::read_dir(&folder).unwrap().count(), 1);
     }
 
     #[test]
