@@ -188,17 +188,13 @@ impl Output {
     }
 }
 
-/// Keeps the partial record of a run that ended early, and reports its path.
+/// Keeps the partial records of a run that ended early, and reports their paths.
 pub fn keep_partial(recorder: Recorder, reason: &str) {
-    match recorder.finish_partial(reason) {
-        Ok(paths) => {
-            for path in paths {
-                warn(format_args!("the partial record is in {}", path.display()));
-            }
+    for kept in recorder.finish_partial(reason) {
+        match kept {
+            Ok(path) => warn(format_args!("the partial record is in {}", path.display())),
+            Err(error) => warn(format_args!("a partial record could not be kept: {error}")),
         }
-        Err(error) => warn(format_args!(
-            "the partial record could not be kept: {error}"
-        )),
     }
 }
 

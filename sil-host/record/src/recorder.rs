@@ -192,18 +192,16 @@ impl Recorder {
         Ok(commit_all(files)?)
     }
 
-    /// Keeps the recorded part of a run that ended early, and returns the files' names. Earlier
-    /// records stay.
-    ///
-    /// # Errors
-    /// See [`Recorder::finish`].
-    pub fn finish_partial(mut self, reason: &str) -> Result<Vec<PathBuf>, RecordError> {
-        self.hand_over()?;
-        let mut kept = Vec::new();
-        for sink in self.end()? {
-            kept.extend(sink.finish_partial(reason)?);
+    /// Keeps the recorded part of a run that ended early. Returns the name of each file, or why it could not be kept;
+    /// the others are. Earlier records stay.
+    pub fn finish_partial(mut self, reason: &str) -> Vec<Result<PathBuf, RecordError>> {
+        match self.hand_over().and_then(|()| self.end()) {
+            Ok(sinks) => sinks
+                .into_iter()
+                .filter_map(|sink| sink.finish_partial(reason).transpose())
+                .collect(),
+            Err(error) => vec![Err(error)],
         }
-        Ok(kept)
     }
 
     #[cold]

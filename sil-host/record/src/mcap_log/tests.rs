@@ -317,3 +317,27 @@ fn a_full_disk_ends_the_recording_with_one_error_and_leaves_no_file() {
     is_reported(recorder.finish().unwrap_err());
     assert!(fs::read_dir(folder.path()).unwrap().next().is_none());
 }
+
+#[test]
+fn a_partial_file_that_cannot_be_written_leaves_the_others() {
+    let folder = tempfile::tempdir().unwrap();
+    let scenario = scenario("edge", &[]);
+    let file = |name: &str| AtomicFile::create(folder.path().join(name)).unwrap();
+    let log = McapLog::to(file("run.mcap"), &scenario, Source::Simulation).unwrap();
+    let mut full = file("run.csv");
+    full.room = 100;
+    let sinks: Vec<Box<dyn Sink>> = vec![
+        Box::new(log),
+        Box::new(CsvTable::to(full).unwrap()),
+        Box::new(CsvTable::to(file("second.csv")).unwrap()),
+    ];
+    let mut recorder = Recorder::start(&scenario.controller_configuration(), sinks).unwrap();
+    recorder.push(&Sample::default()).unwrap();
+    let kept = recorder.finish_partial("stopped");
+    let [Ok(record), Err(error), Ok(table)] = kept.as_slice() else {
+        panic!("{kept:?}");
+    };
+    assert!(record.exists() && table.exists());
+    assert!(error.to_string().contains("run.csv"), "{error}");
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 2);
+}
