@@ -8,6 +8,7 @@ use std::path::PathBuf;
 use painleve_files::atomic_file::AtomicFile;
 
 use crate::fields::{Read, TOPICS};
+use crate::messages::nanoseconds;
 use crate::recorder::{RecordError, RecordedTick, Sink};
 
 /// Returns the header of the table.
@@ -23,7 +24,7 @@ pub fn header() -> Vec<String> {
 
 /// Returns the row of a tick.
 pub fn row(tick: &RecordedTick<'_>) -> Vec<String> {
-    let mut row = vec![decimal(tick.sample.plant.time_s)];
+    let mut row = vec![time(nanoseconds(tick.sample.plant.time_s))];
     for topic in TOPICS {
         let known = tick.estimates.is_some() || !topic.needs_estimates;
         row.extend(topic.fields.iter().map(|field| match field.read {
@@ -36,6 +37,11 @@ pub fn row(tick: &RecordedTick<'_>) -> Vec<String> {
         }));
     }
     row
+}
+
+/// Returns the cell of a time: s to the nanosecond, as in a record.
+pub(crate) fn time(time_ns: u64) -> String {
+    decimal(time_ns as f64 / 1e9)
 }
 
 /// Returns the shortest decimal that gives the same number; an empty string if it is not finite.

@@ -7,7 +7,7 @@ use std::io::{Read, Write};
 use serde::de::{DeserializeSeed, Deserializer, IgnoredAny, MapAccess, Visitor};
 use serde_json::value::RawValue;
 
-use crate::csv_table::{decimal, header};
+use crate::csv_table::{header, time};
 use crate::fields::{TOPICS, Topic};
 use crate::record_file::{Damage, Extent, RecordedMessage, messages};
 
@@ -129,8 +129,8 @@ impl<W: Write> Rows<W> {
         let cells = TOPICS.iter().zip(row.cells).flat_map(|(topic, cells)| {
             cells.unwrap_or_else(|| vec![String::new(); topic.fields.len()])
         });
-        let time = decimal(time_ns as f64 / 1e9);
-        self.writer.write_record(std::iter::once(time).chain(cells))
+        self.writer
+            .write_record(std::iter::once(time(time_ns)).chain(cells))
     }
 }
 

@@ -9,6 +9,7 @@ use painleve_plant::scenario::Scenario;
 use painleve_shared::ArmParameters;
 use serde_json::{Value, json};
 
+use crate::messages::nanoseconds;
 use crate::recorder::RecordedTick;
 
 /// Rate of the scene, Hz.
@@ -233,8 +234,8 @@ fn cube(at: [f64; 3], size: [f64; 3], colour: Value) -> Value {
 }
 
 fn timestamp(time_s: f64) -> Value {
-    let nanoseconds = (time_s * 1e9).round() as u64;
-    json!({ "sec": nanoseconds / 1_000_000_000, "nsec": nanoseconds % 1_000_000_000 })
+    let time_ns = nanoseconds(time_s);
+    json!({ "sec": time_ns / 1_000_000_000, "nsec": time_ns % 1_000_000_000 })
 }
 
 fn vector([x, y, z]: [f64; 3]) -> Value {

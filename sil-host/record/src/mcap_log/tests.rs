@@ -319,6 +319,17 @@ fn a_full_disk_ends_the_recording_with_one_error_and_leaves_no_file() {
 }
 
 #[test]
+fn where_a_period_is_no_whole_nanosecond_the_table_is_that_of_the_record() {
+    let folder = tempfile::tempdir().unwrap();
+    let scenario = scenario("edge", &["run.tick_hz=3000", "run.duration_s=0.01"]);
+    let (record, table) = record(folder.path(), &scenario);
+    let mut exported = Vec::new();
+    ticks_to_csv(&record[..], &mut exported).unwrap();
+    assert_eq!(table.lines().count(), 31);
+    assert_eq!(String::from_utf8(exported).unwrap(), table);
+}
+
+#[test]
 fn a_partial_file_that_cannot_be_written_leaves_the_others() {
     let folder = tempfile::tempdir().unwrap();
     let scenario = scenario("edge", &[]);
