@@ -63,13 +63,13 @@ fn rows(run: &Run, scenario: &Scenario) -> Vec<u8> {
 
 /// Returns the lift-offs and faults of a run as the page lists them.
 fn events(run: &Run) -> Vec<Value> {
-    let lift_offs = run
-        .lift_offs_s()
-        .map(|time_s| (time_s, "lift-off", "lift-off".to_owned()));
+    let lift_offs = run.lift_offs_s().into_iter().flatten();
+    let lift_offs = lift_offs.map(|time_s| (time_s, "lift-off", "lift-off".to_owned()));
     let faults = run
         .table
         .changes("actuator.fault_number")
-        .filter(|(_, _, fault)| *fault != 0.0)
+        // Not of a table that lacks it.
+        .filter(|(_, _, fault)| *fault > 0.0)
         .map(|(time_s, _, fault)| (time_s, "fault", format!("fault {fault}")));
     let mut events: Vec<_> = lift_offs.chain(faults).collect();
     events.sort_by(|(one, ..), (other, ..)| one.total_cmp(other));
@@ -121,4 +121,34 @@ fn settings(runs: &[Run]) -> Option<Value> {
             "rows": rows,
         })
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use painleve_record::comparison::COLUMNS;
+    use painleve_record::run_table::RunTable;
+
+    fn events_of(table: &str) -> Vec<Value> {
+        let table = RunTable::of_csv(table.as_bytes(), &COLUMNS).unwrap();
+        let (label, scenario) = ("run".into(), None);
+        events(&Run {
+            label,
+            table,
+            scenario,
+        })
+    }
+
+    #[test]
+    fn what_is_not_known_is_no_event() {
+        let header =
+            "time_s,estimates.tip_t_m,plant.mode_number,plant.p_per_kg,actuator.fault_number";
+        let rows = |p: &str| format!("{header}\n0,0,3,{p},0\n1,0,0,{p},0\n2,0,0,{p},8\n");
+        let fault = json!([2.0, "fault", "fault 8"]);
+        let lift_off = json!([1.0, "lift-off", "lift-off"]);
+        assert_eq!(events_of(&rows("1.5")), [lift_off, fault.clone()]);
+        assert_eq!(events_of(&rows("")), [fault]);
+        let nothing = events_of("time_s,estimates.tip_t_m\n0,0\n1,0\n2,0\n");
+        assert_eq!(nothing, Vec::<Value>::new());
+    }
 }

@@ -101,10 +101,12 @@ impl Run {
         self.table.time_s.get(tick).copied()
     }
 
-    /// Returns the times at which the tip leaves the belt, s; none for a real arm, whose mode is not known.
-    pub fn lift_offs_s(&self) -> impl Iterator<Item = f64> + '_ {
+    /// Returns the times at which the tip leaves the belt, s; `None` for a real arm, whose mode is not known.
+    pub fn lift_offs_s(&self) -> Option<Vec<f64>> {
         let changes = self.table.changes("plant.mode_number");
-        changes.filter_map(|(time_s, from, to)| (from != 0.0 && to == 0.0).then_some(time_s))
+        let lift_offs = changes.filter(|(_, from, to)| *from > 0.0 && *to == 0.0);
+        let is_simulated = self.table.knows("plant.p_per_kg");
+        is_simulated.then(|| lift_offs.map(|(time_s, ..)| time_s).collect())
     }
 }
 
@@ -151,9 +153,9 @@ pub struct Outcome {
     pub first_lift_off_s: Option<f64>,
     /// Number of the fault at the end, 0 for none.
     pub fault: u64,
-    /// Position of the tip at the end, mm.
+    /// Position of the tip at the last tick, mm; absent if it is not known there.
     pub final_tip_mm: Option<f64>,
-    /// Tracking error at the end, mm.
+    /// Tracking error at the last tick, mm; absent if it is not known there, as after a fault.
     pub final_error_mm: Option<f64>,
 }
 
@@ -332,26 +334,25 @@ impl<'a> Comparison<'a> {
         let runs = self.runs.iter().zip(&self.zero_s).zip(&self.values);
         runs.map(|((run, zero_s), values)| {
             let table = &run.table;
-            let lift_offs: Vec<f64> = run
-                .lift_offs_s()
-                .map(|time_s| time_s - zero_s)
-                .filter(|after_s| *after_s >= 0.0)
-                .collect();
-            let last =
-                |values: &[f64]| values.iter().rev().find(|value| value.is_finite()).copied();
-            let end_s = last(&table.time_s).unwrap_or_default();
+            let mut lift_offs = run.lift_offs_s();
+            if let Some(times) = &mut lift_offs {
+                times.retain(|time_s| time_s >= zero_s);
+            }
+            let first = lift_offs.as_ref().and_then(|times| times.first());
+            let end_s = table.time_s.last().copied().unwrap_or_default();
+            // After a fault there is no reference: an earlier error is not that at the end.
+            let at_end = |values: &[f64]| values.last().copied().filter(|value| value.is_finite());
+            let faults = table.column("actuator.fault_number").iter().rev();
+            let fault = faults.copied().find(|fault| fault.is_finite());
             Outcome {
                 run: run.label.clone(),
                 event_s: *zero_s,
                 duration_s: end_s - zero_s,
-                // Of a real arm the mode is not known.
-                lift_offs: table
-                    .knows("plant.p_per_kg")
-                    .then_some(lift_offs.len() as u64),
-                first_lift_off_s: lift_offs.first().copied(),
-                fault: last(table.column("actuator.fault_number")).unwrap_or_default() as u64,
-                final_tip_mm: last(&values[0]),
-                final_error_mm: last(&values[1]),
+                first_lift_off_s: first.map(|time_s| time_s - zero_s),
+                lift_offs: lift_offs.map(|times| times.len() as u64),
+                fault: fault.unwrap_or_default() as u64,
+                final_tip_mm: at_end(&values[0]),
+                final_error_mm: at_end(&values[1]),
             }
         })
         .collect()
@@ -418,6 +419,48 @@ mod tests {
         let comparison = Comparison::new(&runs, Alignment::Enable).unwrap();
         assert!((comparison.differences()[0].mean - 3.0).abs() < 1e-9);
         assert_eq!(comparison.outcomes()[1].lift_offs, None);
+    }
+
+    fn of_rows(columns: &str, rows: &str) -> Run {
+        let text = format!("time_s,{columns},actuator.fault_number\n{rows}");
+        Run {
+            label: "run".into(),
+            table: RunTable::of_csv(text.as_bytes(), &COLUMNS).unwrap(),
+            scenario: None,
+        }
+    }
+
+    #[test]
+    fn the_error_before_a_fault_is_not_the_final_one() {
+        let columns = "plant.tip_t_m,plant.reference_tip_t_m";
+        let runs = [of_rows(columns, "0,0.1,0.102,0\n1,0.1,0.101,0\n2,0.3,,8\n")];
+        let outcomes = Comparison::new(&runs, Alignment::Start).unwrap().outcomes();
+        let Outcome {
+            fault,
+            final_tip_mm,
+            final_error_mm,
+            ..
+        } = outcomes[0];
+        assert_eq!(
+            (fault, final_tip_mm, final_error_mm),
+            (8, Some(300.0), None)
+        );
+        assert_eq!(outcomes[0].cells()[7], "–");
+    }
+
+    #[test]
+    fn only_a_simulated_tip_is_known_to_lift_off() {
+        let columns = "plant.mode_number,plant.p_per_kg,estimates.tip_t_m";
+        let modes = |p: &str| format!("0,0,{p},0,0\n1,3,{p},0,0\n2,0,{p},0,0\n3,1,{p},0,0\n");
+        let [simulated, arm] = ["1.5", ""].map(|p| of_rows(columns, &modes(p)));
+        assert_eq!(simulated.lift_offs_s(), Some(vec![2.0]));
+        assert_eq!(arm.lift_offs_s(), None);
+        let runs = [arm];
+        let outcomes = Comparison::new(&runs, Alignment::Start).unwrap().outcomes();
+        assert_eq!(
+            (outcomes[0].lift_offs, outcomes[0].first_lift_off_s),
+            (None, None)
+        );
     }
 
     #[test]
