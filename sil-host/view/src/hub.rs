@@ -17,10 +17,10 @@ use crate::locked;
 use crate::parameters::Parameter;
 
 /// Most viewers of each kind at once.
-const MOST_VIEWERS: usize = 8;
+pub(crate) const MOST_VIEWERS: usize = 8;
 /// Bytes of rows that may wait for a page.
 const MOST_BYTES: usize = 4 << 20;
-/// Messages that may wait for a page: a few hundred events and the answers to some orders.
+/// Messages, and events, that may wait for a page.
 const MOST_MESSAGES: usize = 1024;
 /// What may wait for a Foxglove client: ticks and events of a few seconds.
 const MOST_ENTRIES: usize = 8192;
@@ -39,24 +39,30 @@ pub struct Hub {
     description: Mutex<Option<String>>,
 }
 
-/// What waits for a page.
+/// What waits for a page: first what it is told, then the data of the run that it was told about.
 #[derive(Debug, Default)]
 pub(crate) struct PageQueue {
-    pub(crate) rows: Vec<u8>,
     pub(crate) messages: VecDeque<String>,
+    pub(crate) events: VecDeque<String>,
+    pub(crate) rows: Vec<u8>,
 }
 
 impl PageQueue {
-    /// Adds what fits; the oldest is lost.
-    fn push(&mut self, rows: &[u8], messages: &[String]) {
+    /// Adds data that fit; the oldest are lost.
+    fn push(&mut self, rows: &[u8], events: &[String]) {
         if self.rows.len() + rows.len() > MOST_BYTES {
             self.rows.clear();
         }
         self.rows.extend_from_slice(rows);
-        self.messages.extend(messages.iter().cloned());
-        let excess = self.messages.len().saturating_sub(MOST_MESSAGES);
-        self.messages.drain(..excess);
+        add(&mut self.events, events);
     }
+}
+
+/// Adds texts; the oldest are lost if there are too many.
+fn add(queue: &mut VecDeque<String>, texts: &[String]) {
+    queue.extend(texts.iter().cloned());
+    let excess = queue.len().saturating_sub(MOST_MESSAGES);
+    queue.drain(..excess);
 }
 
 /// What waits for a Foxglove client.
@@ -114,29 +120,38 @@ impl Hub {
         self.has_subscribers.load(Ordering::Relaxed)
     }
 
-    /// Passes rows and messages to every page.
-    pub fn publish(&self, rows: &[u8], messages: &[Value]) {
-        let messages: Vec<String> = messages.iter().map(Value::to_string).collect();
-        self.pages.each(|queue| queue.push(rows, &messages));
+    /// Passes rows and events to every page.
+    pub fn publish(&self, rows: &[u8], events: &[Value]) {
+        let events: Vec<String> = events.iter().map(Value::to_string).collect();
+        self.pages.each(|queue| queue.push(rows, &events));
+    }
+
+    /// Sends a message to every page.
+    pub fn tell(&self, message: &Value) {
+        let message = [message.to_string()];
+        self.pages.each(|queue| add(&mut queue.messages, &message));
     }
 
     /// Tells every page, also those to come, what runs: [`description`](crate::page::description).
     pub fn describe(&self, run: &Value) {
         let message = json!({ "run": run });
         *locked(&self.description) = Some(message.to_string());
-        self.publish(&[], &[message]);
+        self.tell(&message);
     }
 
     /// Adds a page, which is told what runs; `None` if there are too many.
     pub(crate) fn join_page(&self) -> Option<Arc<Mutex<PageQueue>>> {
         let queue = self.pages.join()?;
-        locked(&queue).push(&[], locked(&self.description).as_slice());
+        add(
+            &mut locked(&queue).messages,
+            locked(&self.description).as_slice(),
+        );
         Some(queue)
     }
 
     /// Tells every viewer that a request was carried out, and how if there is something to say.
     pub fn note(&self, text: &str) {
-        self.publish(&[], &[json!({ "note": text })]);
+        self.tell(&json!({ "note": text }));
         if !text.is_empty() {
             self.send(&[Entry::Status(Severity::Information, text.into())]);
         }
@@ -144,14 +159,19 @@ impl Hub {
 
     /// Tells every viewer why something is impossible.
     pub fn refuse(&self, text: &str) {
-        self.publish(&[], &[json!({ "error": text })]);
+        self.tell(&json!({ "error": text }));
         self.send(&[Entry::Status(Severity::Error, text.into())]);
     }
 
     /// Tells every viewer that the run starts again.
     pub fn restart(&self) {
         self.session.fetch_add(1, Ordering::Relaxed);
-        self.publish(&[], &[json!({ "reset": true })]);
+        // What waits is of the run before.
+        self.pages.each(|queue| {
+            queue.events.clear();
+            queue.rows.clear();
+        });
+        self.tell(&json!({ "reset": true }));
         self.send(&[Entry::Restarted]);
     }
 

@@ -2,8 +2,14 @@
 
 use std::io::ErrorKind;
 use std::net::TcpStream;
+use std::time::Instant;
 
+use tungstenite::protocol::CloseFrame;
+use tungstenite::protocol::frame::coding::CloseCode;
 use tungstenite::{Message, WebSocket};
+
+use crate::connection::PATIENCE;
+use crate::hub::MOST_VIEWERS;
 
 /// Waits for a viewer's message until it is time to send to it.
 pub(crate) fn receive(
@@ -19,4 +25,17 @@ pub(crate) fn receive(
         }
         Err(error) => Err(error),
     }
+}
+
+/// Closes the connection of one viewer too many, and tells it why.
+pub(crate) fn turn_away(mut socket: WebSocket<TcpStream>) {
+    let reason = format!("{MOST_VIEWERS} viewers of this kind watch the run already: close one");
+    let frame = CloseFrame {
+        code: CloseCode::Again,
+        reason: reason.into(),
+    };
+    let start = Instant::now();
+    let closing = socket.close(Some(frame)).is_ok();
+    // Until the viewer has closed it, too: what it sends at once would else end the connection before the reason.
+    while closing && start.elapsed() < PATIENCE && receive(&mut socket).is_ok() {}
 }

@@ -22,7 +22,7 @@ use crate::connection::{Connection, PATIENCE};
 use crate::foxglove;
 use crate::hub::{Hub, PageQueue};
 use crate::locked;
-use crate::receive::receive;
+use crate::receive::{receive, turn_away};
 use crate::request::{Desk, Orders};
 
 /// Time between two messages to a viewer.
@@ -166,6 +166,7 @@ impl Service {
     /// Sends to one viewer and takes its orders until it leaves.
     fn view(&self, mut socket: WebSocket<TcpStream>) -> io::Result<()> {
         let Some(waiting) = self.hub.join_page() else {
+            turn_away(socket);
             return Ok(());
         };
         let mut desk = Desk::new(self.orders.clone());
@@ -191,12 +192,16 @@ fn exchange(
             socket.send(Message::text(message.to_string()))?;
         }
     }
-    let PageQueue { rows, messages } = std::mem::take(&mut *locked(waiting));
+    let PageQueue {
+        messages,
+        events,
+        rows,
+    } = std::mem::take(&mut *locked(waiting));
+    for message in messages.into_iter().chain(events) {
+        socket.send(Message::text(message))?;
+    }
     if !rows.is_empty() {
         socket.send(Message::binary(rows))?;
-    }
-    for message in messages {
-        socket.send(Message::text(message))?;
     }
     Ok(())
 }
@@ -247,6 +252,7 @@ mod tests {
     use std::time::Instant;
 
     use super::*;
+    use crate::hub::MOST_VIEWERS;
     use crate::request::ViewerRequest;
 
     fn server(origins: &[String]) -> Server {
@@ -373,20 +379,74 @@ mod tests {
         assert_eq!(order.request, ViewerRequest::Reset);
     }
 
+    fn viewer(server: &Server) -> WebSocket<TcpStream> {
+        let stream = TcpStream::connect(server.address).unwrap();
+        stream.set_read_timeout(Some(PATIENCE)).unwrap();
+        let url = format!("ws://{}/live", server.address);
+        tungstenite::client(url, stream).unwrap().0
+    }
+
+    #[test]
+    fn after_a_reset_come_all_rows_of_the_new_run_and_none_of_the_old() {
+        let hub = Hub::default();
+        let waiting = hub.join_page().unwrap();
+        let event = |time_s: f64| serde_json::json!({ "event": time_s });
+        hub.publish(&[1], &[event(9.0)]);
+        hub.restart();
+        hub.publish(&[2], &[event(0.0)]);
+        hub.tell(&serde_json::json!({ "status": 1 }));
+        let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).unwrap();
+        let stream = TcpStream::connect(listener.local_addr().unwrap()).unwrap();
+        let mut page = WebSocket::from_raw_socket(stream, Role::Client, None);
+        let (stream, _) = listener.accept().unwrap();
+        stream.set_read_timeout(Some(INTERVAL)).unwrap();
+        let mut socket = WebSocket::from_raw_socket(stream, Role::Server, None);
+        exchange(&mut socket, &waiting, &mut Desk::new(Arc::default())).unwrap();
+        for expected in [
+            Message::text("{\"reset\":true}"),
+            Message::text("{\"status\":1}"),
+            Message::text("{\"event\":0.0}"),
+            Message::binary(vec![2]),
+        ] {
+            assert_eq!(page.read().unwrap(), expected);
+        }
+    }
+
+    #[test]
+    fn one_viewer_too_many_is_told_why_and_may_come_again() {
+        let server = server(&[]);
+        let mut viewers: Vec<_> = (0..MOST_VIEWERS).map(|_| viewer(&server)).collect();
+        while server.hub.viewers() < MOST_VIEWERS {
+            thread::sleep(Duration::from_millis(1));
+        }
+        let Message::Close(Some(close)) = viewer(&server).read().unwrap() else {
+            panic!("not closed with a reason");
+        };
+        assert!(close.reason.contains("8 viewers"), "{}", close.reason);
+        drop(viewers.pop());
+        while server.hub.viewers() == MOST_VIEWERS {
+            thread::sleep(Duration::from_millis(1));
+        }
+        let mut viewer = viewer(&server);
+        while server.hub.viewers() < MOST_VIEWERS {
+            thread::sleep(Duration::from_millis(1));
+        }
+        server.hub.publish(&[1], &[]);
+        assert_eq!(viewer.read().unwrap(), Message::binary(vec![1]));
+    }
+
     #[test]
     fn a_viewer_gets_what_is_published_and_its_orders_arrive() {
         let server = server(&[]);
-        let stream = TcpStream::connect(server.address).unwrap();
-        let url = format!("ws://{}/live", server.address);
-        let (mut socket, _) = tungstenite::client(url, stream).unwrap();
+        let mut socket = viewer(&server);
         while server.hub.viewers() == 0 {
             thread::sleep(Duration::from_millis(1));
         }
         server
             .hub
             .publish(&[1, 2, 3], &[serde_json::json!({ "a": 1 })]);
-        assert_eq!(socket.read().unwrap(), Message::binary(vec![1, 2, 3]));
         assert_eq!(socket.read().unwrap(), Message::text("{\"a\":1}"));
+        assert_eq!(socket.read().unwrap(), Message::binary(vec![1, 2, 3]));
         socket
             .send(Message::text("{\"step\":{\"ticks\":3}}"))
             .unwrap();

@@ -323,7 +323,7 @@ impl Live {
             "real_time_factor": rate / self.tick_hz(),
             "settings": page_settings::settings(&self.scenario),
         }});
-        self.hub.publish(&[], &[status]);
+        self.hub.tell(&status);
     }
 }
 

@@ -17,7 +17,7 @@ use super::services;
 use crate::hub::{ClientQueue, Entry, Hub, Severity, WatchedTick};
 use crate::locked;
 use crate::parameters::Parameter;
-use crate::receive::receive;
+use crate::receive::{receive, turn_away};
 use crate::request::{Desk, TOO_MANY};
 
 /// First bytes of binary messages.
@@ -73,6 +73,7 @@ struct Subscription {
 /// Talks to a client until it leaves; one client too many is turned away.
 pub(crate) fn serve(socket: WebSocket<TcpStream>, hub: &Hub, desk: Desk) {
     let Some(queue) = hub.clients.join() else {
+        turn_away(socket);
         return;
     };
     let mut client = Client {
