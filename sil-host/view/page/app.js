@@ -54,14 +54,15 @@ class Page {
     }
   }
 
+  /** Says what has happened, also where an event is not listed. */
   verdict() {
-    const count = (kind) => this.events.filter((event) => event[1] === kind).length + (this.run.more_events?.[kind] ?? 0);
-    const first = this.events.find((event) => event[1] === "lift-off"), fault = this.events.find((event) => event[1] === "fault");
-    const lifts = count("lift-off");
+    const totals = this.run.totals ?? {}, { "lift-off": [lifts, first] = [0], fault: [, fault] = [] } = totals;
     const texts = [lifts ? `${lifts} lift-off${lifts > 1 ? "s" : ""}, first at ${first[0].toFixed(3)} s` : "no lift-off"];
     if (fault) texts.push(fault[2]);
     $("verdict").textContent = texts.join(" · ");
     $("verdict").dataset.good = String(!lifts && !fault);
+    const listed = this.events.length, count = Object.values(totals).reduce((sum, [number]) => sum + number, 0);
+    $("events").querySelector("summary").textContent = `Events (${count > listed ? `${count}, the ${this.live ? "last" : "first"} ${listed} listed` : listed})`;
   }
 
   /** Shows other runs beside this one. */
@@ -235,8 +236,6 @@ class Page {
       item.append(button);
       list.append(item);
     }
-    const more = Object.values(this.run.more_events ?? {}).reduce((sum, count) => sum + count, 0);
-    $("events").querySelector("summary").textContent = `Events (${this.events.length + more}${more ? `, the first ${this.events.length} listed` : ""})`;
     this.current = null;
   }
 

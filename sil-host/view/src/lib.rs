@@ -3,6 +3,7 @@
 //! - [`row`]: the data of one tick for the page, as bytes
 //! - [`thinning`]: limits the number of rows and keeps the extremes of the contact force
 //! - [`comparison`]: the page of a run with others beside it
+//! - [`events`]: events as the page lists and counts them
 //! - [`page`]: the page of a recorded run as one file that needs no network
 //! - [`server`]: the viewers of a live run on this machine: the same page, and Foxglove
 //! - [`access`]: who may be one; `connection`: a connection until it is
@@ -15,6 +16,7 @@
 pub mod access;
 pub mod comparison;
 mod connection;
+pub mod events;
 pub mod foxglove;
 pub mod hub;
 pub mod page;

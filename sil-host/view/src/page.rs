@@ -1,6 +1,5 @@
 //! The page of a recorded run as one HTML file that needs no network.
 
-use std::collections::BTreeMap;
 use std::io::Write;
 
 use data_encoding::BASE64;
@@ -10,10 +9,11 @@ use painleve_record::events::RunEvent;
 use painleve_record::{RecordError, RecordedTick, Sink};
 use serde_json::{Value, json};
 
+use crate::events::{Totals, entry};
 use crate::row::{BYTE_COLUMNS, COLUMNS, Follower, ROW_BYTES, Row};
 use crate::thinning::Thinned;
 
-/// Number of events listed individually; further ones are counted.
+/// Number of events listed individually; all are counted.
 const LISTED_EVENTS: usize = 1000;
 
 const TEMPLATE: &str = include_str!("../page/index.html");
@@ -69,8 +69,7 @@ pub struct PageFile {
     follower: Follower,
     rows: Thinned,
     events: Vec<Value>,
-    /// Numbers of events that are not listed, by kind.
-    more_events: BTreeMap<&'static str, u64>,
+    totals: Totals,
 }
 
 impl PageFile {
@@ -82,7 +81,7 @@ impl PageFile {
             follower: Follower::new(scenario),
             rows: Thinned::default(),
             events: Vec::new(),
-            more_events: BTreeMap::new(),
+            totals: Totals::default(),
         }
     }
 }
@@ -95,10 +94,9 @@ impl Sink for PageFile {
     }
 
     fn event(&mut self, event: &RunEvent) -> Result<(), RecordError> {
+        self.totals.count(event);
         if self.events.len() < LISTED_EVENTS {
-            self.events.push(event_entry(event));
-        } else {
-            *self.more_events.entry(event.kind.name()).or_default() += 1;
+            self.events.push(entry(event));
         }
         Ok(())
     }
@@ -109,7 +107,7 @@ impl Sink for PageFile {
             mut description,
             rows,
             events,
-            more_events,
+            totals,
             ..
         } = *self;
         let rows = rows.finish();
@@ -117,7 +115,7 @@ impl Sink for PageFile {
         rows.iter().for_each(|row| row.write(&mut bytes));
         description["rows"] = BASE64.encode(&bytes).into();
         description["events"] = events.into();
-        description["more_events"] = json!(more_events);
+        description["totals"] = json!(totals);
         let path = file.path().to_path_buf();
         file.write_all(html(&description).as_bytes())
             .map_err(|error| RecordError::write(&path, error))?;
@@ -125,7 +123,35 @@ impl Sink for PageFile {
     }
 }
 
-/// Returns an event as the page lists it: time, kind, text.
-pub fn event_entry(event: &RunEvent) -> Value {
-    json!([event.time_s, event.kind.name(), event.kind.describe()])
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use painleve_plant::{ContactMode, Event};
+    use painleve_record::events::EventKind;
+    use painleve_shared::status::Fault;
+
+    #[test]
+    fn a_fault_after_the_last_listed_event_is_on_the_page() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("run.html");
+        let file = AtomicFile::create(&path).unwrap();
+        let mut page = PageFile::new(file, &Scenario::default());
+        let lift_off = EventKind::Plant(Event::ModeChange {
+            from: ContactMode::Stick,
+            to: ContactMode::Flight,
+        });
+        let fault = EventKind::Fault(Fault::LiftOffTooLong);
+        let lift_offs = (1..=1200).map(|number| (0.5 * f64::from(number), lift_off));
+        for (time_s, kind) in lift_offs.chain([(601.0, fault), (602.0, fault)]) {
+            page.event(&RunEvent { time_s, kind }).unwrap();
+        }
+        let file = Sink::finish(Box::new(page)).unwrap();
+        file.unwrap().commit().unwrap();
+        let html = std::fs::read_to_string(&path).unwrap();
+        let text = fault.describe();
+        let totals = format!(
+            r#""totals":{{"fault":[2,[601.0,"fault","{text}"]],"lift-off":[1200,[0.5,"lift-off","#
+        );
+        assert!(html.contains(&totals));
+    }
 }

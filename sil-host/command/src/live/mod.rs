@@ -322,6 +322,7 @@ impl Live {
             "ticks_per_s": rate,
             "real_time_factor": rate / self.tick_hz(),
             "settings": page_settings::settings(&self.scenario),
+            "totals": self.viewers.totals,
         }});
         self.hub.tell(&status);
     }

@@ -14,13 +14,13 @@ use painleve_plant::{Controller, Event};
 use painleve_record::RecordedTick;
 use painleve_record::events::{ControllerEvents, EventKind, RunEvent};
 use painleve_shared::frame::SensorFrame;
+use painleve_view::events::{Totals, entry};
 use painleve_view::foxglove::feed::Feed;
 use painleve_view::hub::Hub;
-use painleve_view::page::event_entry;
 use painleve_view::row::{Follower, Row};
 use serde_json::{Value, json};
 
-/// Most events that wait for the viewers; more are left out.
+/// Most events that wait for the viewers; more are counted only.
 const MOST_EVENTS: usize = 50;
 
 /// The controller in this process, with its telemetry within reach of the monitor.
@@ -47,7 +47,7 @@ impl ControllerHost for Host {
     }
 }
 
-/// Collects rows, messages and events for the viewers.
+/// Collects rows and events for the viewers.
 pub(super) struct Viewers {
     hub: Arc<Hub>,
     telemetry: Rc<Cell<Telemetry>>,
@@ -55,8 +55,10 @@ pub(super) struct Viewers {
     is_watched: Rc<Cell<bool>>,
     follower: Follower,
     events: ControllerEvents,
+    /// The events since the start.
+    pub(super) totals: Totals,
     rows: Vec<u8>,
-    messages: Vec<Value>,
+    listed: Vec<Value>,
     feed: Feed,
 }
 
@@ -68,8 +70,9 @@ impl Viewers {
             is_watched: Rc::default(),
             follower: Follower::new(scenario),
             events: ControllerEvents::default(),
+            totals: Totals::default(),
             rows: Vec::new(),
-            messages: Vec::new(),
+            listed: Vec::new(),
             feed: Feed::new(hub.clone(), scenario),
             hub,
         }
@@ -91,17 +94,18 @@ impl Viewers {
 
     /// Passes everything on to the viewers.
     pub(super) fn publish(&mut self) {
-        if !self.rows.is_empty() || !self.messages.is_empty() {
-            self.hub.publish(&self.rows, &self.messages);
+        if !self.rows.is_empty() || !self.listed.is_empty() {
+            self.hub.publish(&self.rows, &self.listed);
         }
         self.rows.clear();
-        self.messages.clear();
+        self.listed.clear();
         self.feed.send();
     }
 
     fn show(&mut self, event: &RunEvent) {
-        if self.messages.len() < MOST_EVENTS {
-            self.messages.push(json!({ "event": event_entry(event) }));
+        self.totals.count(event);
+        if self.listed.len() < MOST_EVENTS {
+            self.listed.push(json!({ "event": entry(event) }));
             self.feed.event(event);
         }
     }
@@ -135,5 +139,27 @@ impl Monitor for Viewers {
     fn event(&mut self, time_s: f64, event: Event) {
         let kind = EventKind::Plant(event);
         self.show(&RunEvent { time_s, kind });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use painleve_plant::ContactMode;
+
+    use super::*;
+
+    #[test]
+    fn lift_offs_that_are_not_listed_are_counted() {
+        let mut viewers = Viewers::new(&Scenario::default(), Arc::default());
+        let lift_off = Event::ModeChange {
+            from: ContactMode::Stick,
+            to: ContactMode::Flight,
+        };
+        for number in 1..=600 {
+            viewers.event(0.5 * f64::from(number), lift_off);
+        }
+        assert_eq!(viewers.listed.len(), MOST_EVENTS);
+        let first = json!([0.5, "lift-off", "lift-off from stick"]);
+        assert_eq!(json!(viewers.totals), json!({ "lift-off": [600, first] }));
     }
 }

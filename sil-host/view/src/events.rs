@@ -1,0 +1,24 @@
+//! Events as the page lists and counts them.
+
+use std::collections::BTreeMap;
+
+use painleve_record::events::RunEvent;
+use serde::Serialize;
+use serde_json::{Value, json};
+
+/// Returns an event as the page lists it: time, kind, text.
+pub fn entry(event: &RunEvent) -> Value {
+    json!([event.time_s, event.kind.name(), event.kind.describe()])
+}
+
+/// What has happened, whether it is listed or not: the number of events of each kind, and the first one.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct Totals(BTreeMap<&'static str, (u64, Value)>);
+
+impl Totals {
+    /// Counts an event.
+    pub fn count(&mut self, event: &RunEvent) {
+        let first = || (0, entry(event));
+        self.0.entry(event.kind.name()).or_insert_with(first).0 += 1;
+    }
+}
