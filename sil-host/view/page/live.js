@@ -8,30 +8,47 @@ const KEPT_ROWS = 12000, KEPT_EVENTS = 500, SHOWN_S = 10;
 const PUSHES = [["push ←", [-5, 0]], ["push →", [5, 0]], ["push ↑", [0, 15]]], PUSH_S = 0.05;
 
 function connect(page) {
-  // The page's own address contains the token.
-  const socket = new WebSocket(`ws://${location.host}/live${location.search}`);
-  socket.binaryType = "arraybuffer";
-  const rows = [], form = $("parameters"), status = $("status");
-  let listed = 0, turn = 0, outdated = 0;
+  const form = $("parameters"), status = $("status");
+  let socket, fresh = false, listed = 0, turn = 0, outdated = 0;
   const send = (order) => { if (socket.readyState === WebSocket.OPEN) socket.send(JSON.stringify(order)); };
 
   for (const only of document.querySelectorAll("[data-live]")) only.hidden = false;
   status.textContent = "connecting …";
   $("verdict").textContent = "live";
+  open();
 
-  socket.addEventListener("open", () => { status.textContent = "connected"; });
-  socket.addEventListener("close", () => { status.textContent = "the run has ended; the data received stay visible"; setPlaying(false); });
-  socket.addEventListener("message", ({ data }) => {
-    if (typeof data !== "string") { rows.push(data); return; }
+  function open() {
+    // The page's own address contains the token.
+    socket = new WebSocket(`ws://${location.host}/live${location.search}`);
+    socket.binaryType = "arraybuffer";
+    let opened = false, told = false;
+    socket.addEventListener("open", () => { opened = true; });
+    socket.addEventListener("close", ({ reason }) => {
+      setPlaying(false);
+      // The program answers as long as the run goes on.
+      if (!opened) { status.textContent = "the run has ended; the data received stay visible"; return; }
+      status.textContent = `${reason || "the connection is lost"}; connecting again …`;
+      setTimeout(open, 1000);
+    });
+    socket.addEventListener("message", ({ data }) => {
+      // What was missed would be a gap, or another run.
+      if (!told) { told = true; status.textContent = "connected"; clear(); }
+      receive(data);
+    });
+  }
+
+  /** Takes in data at once, whether pictures are drawn or not: a page that is hidden keeps as much as another. */
+  function receive(data) {
+    if (typeof data !== "string") { page.columns.append(data, KEPT_ROWS); fresh = true; return; }
     const message = JSON.parse(data);
-    if (message.event) page.events.push(message.event);
+    if (message.event) add(message.event);
     if (message.run) page.describe(message.run);
     if (message.reset) clear();
     // An accepted order has a note, often an empty one, which replaces an earlier error.
     if ("note" in message) show(message.note);
     if ("error" in message) show(message.error, "error");
     if (message.status) {
-      const { paused, factor, ticks_per_s, real_time_factor, settings } = message.status;
+      const { paused, factor, ticks_per_s, real_time_factor, settings, totals } = message.status;
       for (const { key, value } of settings) {
         const input = form.elements[key];
         if (input && input !== document.activeElement) input.value = value ?? "";
@@ -39,15 +56,24 @@ function connect(page) {
       setPlaying(!paused);
       $("speed").value = String(factor);
       status.textContent = paused ? "paused" : `${real_time_factor.toPrecision(3)}× real time, ${Math.round(ticks_per_s)} ticks/s`;
+      page.run.totals = totals;
+      page.verdict();
     }
-  });
+  }
+
+  function add(event) {
+    page.events.push(event);
+    if (page.events.length <= KEPT_EVENTS) return;
+    page.events.shift();
+    if (listed > 0) { listed -= 1; $("events").querySelector("li").remove(); }
+  }
 
   function show(text, kind = "") { $("message").textContent = text; $("message").className = kind; }
 
   function clear() {
-    rows.length = 0;
     page.columns.clear();
     page.events = [];
+    page.run.totals = {};
     listed = 0;
     page.listEvents();
     page.verdict();
@@ -72,8 +98,8 @@ function connect(page) {
 
   /** Called before every picture. */
   page.incoming = () => {
-    if (rows.length) {
-      for (const buffer of rows.splice(0)) page.columns.append(buffer, KEPT_ROWS);
+    if (fresh) {
+      fresh = false;
       if (page.follow) page.time = page.columns.end;
       page.dirty = true;
       outdateAll();
@@ -85,7 +111,6 @@ function connect(page) {
     if (turn > 0) { page.charts.updateOne(turn - 1, SHOWN_S); return; }
     const { start, end } = page.columns, [from, to] = page.charts.range ?? [Math.max(end - SHOWN_S, start), end];
     for (const ribbon of page.ribbons) ribbon.draw(from, to);
-    if (page.events.length > KEPT_EVENTS) { page.events.splice(0, page.events.length - KEPT_EVENTS / 2); listed = 0; }
     if (page.events.length !== listed) { page.listEvents(listed); listed = page.events.length; page.verdict(); }
   };
 

@@ -77,6 +77,12 @@ fn a_higher_friction_throws_the_tip_off_while_the_run_is_watched() {
 }
 
 #[test]
+fn a_page_without_pictures_or_connection_and_one_too_many_lose_nothing_that_matters() {
+    let bench = Bench::new("live-adversity");
+    watch_live(&bench, &["open-loop-bounce"], "adversity.mjs");
+}
+
+#[test]
 fn the_page_of_a_long_run_is_small() {
     let bench = Bench::new("long-page");
     let options = ["run", "--set", "run.duration_s=60", "--json", "--no-record"];
