@@ -136,20 +136,6 @@ impl<O: Outside> Stm32f4<O> {
         }
     }
 
-    /// Returns the voltage of a converter's channel as a fraction of the supply; `None` while it is
-    /// off.
-    pub fn dac_output(&self, channel: usize) -> Option<f64> {
-        let control = self.dac.control >> (16 * channel);
-        if control & 1 == 0 {
-            return None;
-        }
-        let fraction = f64::from(self.dac.codes[channel]) / 4096.0;
-        // The output buffer reaches to within 0.2 V of either supply.
-        let is_buffered = control & 2 == 0;
-        let margin = if is_buffered { 0.2 / 3.3 } else { 0.0 };
-        Some(fraction.clamp(margin, 1.0 - margin))
-    }
-
     /// Returns the state of the supply supervisor.
     fn supply_is_low(&self) -> bool {
         let thresholds = [2000, 2100, 2300, 2500, 2600, 2700, 2800, 2900];
