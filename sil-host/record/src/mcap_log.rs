@@ -91,7 +91,7 @@ impl McapLog {
             // The default level is slower here and compresses these messages no better.
             .compression_level(1)
             .create(BufWriter::new(file))?;
-        let configuration = toml::to_string(scenario).map_err(io::Error::other)?;
+        let configuration = scenario.to_toml().map_err(io::Error::other)?;
         writer.write_metadata(&Metadata {
             name: NOTES.to_owned(),
             metadata: BTreeMap::from([

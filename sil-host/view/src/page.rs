@@ -56,7 +56,7 @@ pub fn description(scenario: &Scenario) -> Value {
             "link_length_m": scenario.arm.link_length_m,
             "height_m": scenario.arm.height_m,
         },
-        "settings": toml::to_string(scenario).unwrap_or_default(),
+        "settings": scenario.to_toml().unwrap_or_default(),
         "columns": COLUMNS,
         "byte_columns": BYTE_COLUMNS,
     })

@@ -99,7 +99,7 @@ pub fn parameters(scenario: &Scenario, paused: bool, speed: f64) -> Vec<Paramete
         Parameter::new(SPEED, speed.into()),
     ];
     // A scenario that has been loaded can be written.
-    if let Ok(Value::Object(keys)) = serde_json::to_value(scenario) {
+    if let Ok(Value::Object(keys)) = scenario.to_json() {
         for (key, value) in keys {
             add_keys(key, value, &mut found);
         }

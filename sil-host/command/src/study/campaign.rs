@@ -30,8 +30,7 @@ pub fn understand(campaign: &Campaign) -> Result<Understood, CampaignError> {
     let table = options.table()?.ok_or_else(not_shardable)?;
     let text = |name: String| {
         let scenario = Scenario::load_unplaced(&name, &[])?;
-        let text = toml::to_string(&scenario)?;
-        Ok((name, text))
+        Ok((name, scenario.to_toml()?))
     };
     let scenarios = options.scenarios().into_iter().map(text);
     Ok(Understood {

@@ -23,6 +23,24 @@ pub use difference::Difference;
 pub use markdown::settings_table;
 pub use schema::json_schema;
 
+impl Scenario {
+    /// Returns every key of the scenario as TOML. Not generic: serialising a scenario takes long to compile.
+    ///
+    /// # Errors
+    /// For a seed of 2^63 or more, which TOML cannot write.
+    pub fn to_toml(&self) -> Result<String, toml::ser::Error> {
+        toml::to_string(self)
+    }
+
+    /// Returns every key of the scenario as JSON.
+    ///
+    /// # Errors
+    /// None: it would be a mistake in the declaration of a setting.
+    pub fn to_json(&self) -> serde_json::Result<serde_json::Value> {
+        serde_json::to_value(self)
+    }
+}
+
 /// Returns settings as a TOML table; single-precision values keep the digits with which they were
 /// written.
 fn table<T: Serialize>(settings: &T) -> Table {
