@@ -4,7 +4,7 @@ use std::io::{self, BufReader, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use painleve_files::atomic_file::{AtomicFile, AtomicFileError, commit_all, prepare};
+use painleve_files::atomic_file::{AtomicFile, AtomicFileError, commit_all};
 use painleve_files::input_file;
 use painleve_process::interrupt::Interrupt;
 use painleve_process::terminal::warn;
@@ -22,11 +22,8 @@ pub struct ExportArguments {
     /// Record of a run, for example out/run.mcap.
     record: PathBuf,
     /// Write CSV, by default beside the record.
-    #[arg(long, value_name = "PATH", num_args = 0..=1, required_unless_present_any = ["parquet", "ros2"])]
+    #[arg(long, value_name = "PATH", num_args = 0..=1, required_unless_present = "ros2")]
     csv: Option<Option<PathBuf>>,
-    /// Write Parquet, by default beside the record; requires the cargo feature parquet.
-    #[arg(long, value_name = "PATH", num_args = 0..=1)]
-    parquet: Option<Option<PathBuf>>,
     /// Write a ROS 2 bag, by default beside the record.
     #[arg(long, value_name = "PATH", num_args = 0..=1, conflicts_with = "recover")]
     ros2: Option<Option<PathBuf>>,
@@ -85,16 +82,8 @@ fn export_all(arguments: &ExportArguments, interrupt: &Interrupt) -> Result<(), 
         )
     };
     let csv = beside(&arguments.csv, "csv");
-    let parquet = beside(&arguments.parquet, "parquet");
-    if parquet.is_some() && !cfg!(feature = "parquet") {
-        return Err(InputError::NoParquet.into());
-    }
     let bag = beside(&arguments.ros2, "ros2.mcap");
-    let wanted = [
-        ("--csv", csv.as_deref()),
-        ("--parquet", parquet.as_deref()),
-        ("--ros2", bag.as_deref()),
-    ];
+    let wanted = [("--csv", csv.as_deref()), ("--ros2", bag.as_deref())];
     let wanted: Vec<_> = wanted
         .into_iter()
         .filter_map(|(option, path)| Some((option, path?)))
@@ -111,11 +100,6 @@ fn export_all(arguments: &ExportArguments, interrupt: &Interrupt) -> Result<(), 
         let mut file = AtomicFile::create(path).map_err(output)?;
         exported = Some(export(arguments, path, &mut file, interrupt)?);
         files.push(file);
-    }
-    if let Some(path) = &parquet {
-        let mut table = Vec::new();
-        exported = Some(export(arguments, path, &mut table, interrupt)?);
-        files.push(prepare(path, &columns(&table)?).map_err(output)?);
     }
     let mut rows = exported.as_ref().map(|exported| exported.rows);
     if let Some(path) = &bag {
@@ -224,14 +208,4 @@ fn record_error<T, E: Into<RecordFileError>>(
     result: Result<T, E>,
 ) -> Result<T, CommandError> {
     result.map_err(|source| InputError::record(&arguments.record, source).into())
-}
-
-#[cfg(feature = "parquet")]
-fn columns(table: &[u8]) -> Result<Vec<u8>, CommandError> {
-    painleve_study_sweep::parquet::from_csv(table).map_err(output)
-}
-
-#[cfg(not(feature = "parquet"))]
-fn columns(_: &[u8]) -> Result<Vec<u8>, CommandError> {
-    Err(InputError::NoParquet.into())
 }

@@ -33,10 +33,6 @@ pub enum OutputError {
     /// CSV.
     #[error(transparent)]
     Csv(#[from] csv::Error),
-    /// Columns of a table.
-    #[cfg(feature = "parquet")]
-    #[error(transparent)]
-    Columns(#[from] painleve_study_sweep::parquet::ColumnsError),
     /// A part of a file.
     #[error(transparent)]
     Write(#[from] io::Error),
@@ -166,11 +162,6 @@ pub enum InputError {
     /// The rehearsed arm cannot be simulated.
     #[error(transparent)]
     Rehearsal(#[from] SimulatedError),
-    /// This build has no Parquet.
-    #[error(
-        "this build writes no Parquet: build it with `cargo build --release --features parquet`"
-    )]
-    NoParquet,
     /// `--live` together with another host.
     #[error("--live runs the controller in this process: leave out --host")]
     LiveHost,

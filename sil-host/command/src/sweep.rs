@@ -4,7 +4,7 @@ use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, Subcommand};
-use painleve_files::atomic_file::{self, commit_all, prepare};
+use painleve_files::atomic_file::{self, AtomicFile, prepare};
 use painleve_process::terminal::warn;
 use painleve_study_core::outcome;
 use painleve_study_sweep::campaign::{Campaign, Understood};
@@ -106,10 +106,6 @@ struct MergeArguments {
     /// Path of the CSV file; by default merged.csv in the sweep's folder.
     #[arg(long, value_name = "PATH")]
     csv: Option<PathBuf>,
-    /// The same rows as a Parquet file.
-    #[cfg(feature = "parquet")]
-    #[arg(long, value_name = "PATH")]
-    parquet: Option<PathBuf>,
     #[command(flatten)]
     json: JsonOption,
     #[command(flatten)]
@@ -283,7 +279,7 @@ fn compute_shard(
         }
     } else {
         // An unwritable path is reported before anything is computed.
-        atomic_file::AtomicFile::create(&path).map_err(output)?;
+        AtomicFile::create(&path).map_err(output)?;
     }
     let records = arguments
         .threads
@@ -334,30 +330,12 @@ fn merge(arguments: &MergeArguments) -> Result<(), CommandError> {
     let text = folder::merge(folder, &manifest)?;
     let default = folder.join("merged.csv");
     let path = arguments.csv.as_ref().unwrap_or(&default);
-    #[cfg_attr(not(feature = "parquet"), expect(unused_mut))]
-    let mut outputs = vec![("--csv", path.as_path())];
-    #[cfg(feature = "parquet")]
-    outputs.extend(
-        arguments
-            .parquet
-            .iter()
-            .map(|path| ("--parquet", path.as_path())),
-    );
-    distinct_files::check(&outputs)?;
-    #[cfg_attr(not(feature = "parquet"), expect(unused_mut))]
-    let mut files = vec![prepare(path, &text).map_err(output)?];
-    #[cfg(feature = "parquet")]
-    if let Some(path) = &arguments.parquet {
-        let columns = painleve_study_sweep::parquet::from_csv(&text).map_err(output)?;
-        files.push(prepare(path, &columns).map_err(output)?);
-    }
-    commit_all(files).map_err(output)?;
+    distinct_files::check(&[("--csv", path)])?;
+    prepare(path, &text)
+        .and_then(AtomicFile::commit)
+        .map_err(output)?;
     folder::tidy(folder);
-    let files: Vec<_> = outputs
-        .iter()
-        .map(|(_, path)| path.display().to_string())
-        .collect();
-    let result = json!({ "files": files, "rows": manifest.rows, "shards": manifest.shards });
+    let result = json!({ "files": [path.display().to_string()], "rows": manifest.rows, "shards": manifest.shards });
     arguments.json.say(
         &result,
         format_args!(

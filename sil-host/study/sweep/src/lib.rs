@@ -8,7 +8,6 @@
 //! - [`share`]: the rows of a shard, and the shard of this process
 //! - [`shard_file`]: a finished shard, either complete or absent
 //! - [`folder`]: the finished shards, and their merge
-//! - `parquet`: the merged rows as columns, with the feature of that name
 //! - [`mod@array`]: lists of shards in the syntax of schedulers; [`slurm`]: a job script for Slurm
 //!
 //! The files are the only state, and no process waits for another.
@@ -17,8 +16,6 @@ pub mod array;
 pub mod campaign;
 pub mod folder;
 pub mod manifest;
-#[cfg(feature = "parquet")]
-pub mod parquet;
 pub mod shard_file;
 pub mod share;
 pub mod slurm;
