@@ -1,18 +1,16 @@
 //! `painleve figures`: all of the paper's studies, on one page with a comparison to the paper.
 
 use std::path::{Path, PathBuf};
+use std::sync::mpsc;
 
 use clap::Args;
-use painleve_files::atomic_file::{commit_all, prepare};
-use painleve_plant::Event;
-use painleve_plant::closed_loop::{ClosedLoop, LoopError, LoopResult, Monitor};
+use painleve_files::atomic_file::{AtomicFile, commit_all, prepare};
+use painleve_plant::closed_loop::{ClosedLoop, LoopResult, Monitor};
 use painleve_plant::controller_host::InProcess;
-use painleve_plant::sample::Sample;
 use painleve_plant::scenario::{Scenario, ScenarioError};
 use painleve_plant::simulation::Simulation;
-use painleve_record::events::{ControllerEvents, EventKind, RunEvent};
-use painleve_record::replica::Replica;
-use painleve_record::{RecordedTick, RunPlot};
+use painleve_record::events::RunEvent;
+use painleve_record::{RecordError, RecordedTick, Recorder, RunPlot, Sink};
 use painleve_study::STUDIES;
 use painleve_study_core::catalogue::AnyOutcome;
 use painleve_study_core::figures::page_maker::{Fineness, PageMaker};
@@ -144,45 +142,41 @@ fn data(
 /// Runs a scenario and draws it.
 fn simulated(name: &str) -> Result<Section, CommandError> {
     let scenario = Scenario::load(name, &[])?;
-    let mut drawing = Drawing {
+    let (svg, drawn) = mpsc::channel();
+    let drawing = Drawing {
         plot: RunPlot::new(&scenario),
-        replica: Replica::new(&scenario.controller_configuration()),
-        events: ControllerEvents::default(),
+        svg,
     };
-    let result = simulate(&scenario, &mut drawing)?;
-    Ok(figures::run::section(
-        &scenario,
-        &result,
-        drawing.plot.svg(),
-    ))
+    let configuration = scenario.controller_configuration();
+    let recorder = Recorder::start(&configuration, vec![Box::new(drawing)]);
+    let mut recorder = recorder.map_err(output)?;
+    let result = simulate(&scenario, &mut recorder)?;
+    recorder.finish().map_err(output)?;
+    let svg = drawn.recv().unwrap_or_default();
+    Ok(figures::run::section(&scenario, &result, svg))
 }
 
-/// Draws a run while it is simulated.
+/// Draws a run, and sends the figure when it is complete.
 struct Drawing {
     plot: RunPlot,
-    replica: Option<Replica>,
-    events: ControllerEvents,
+    svg: mpsc::Sender<String>,
 }
 
-impl Monitor for Drawing {
-    fn sample(&mut self, sample: &Sample) -> Result<(), LoopError> {
-        if let Some(replica) = &mut self.replica {
-            replica.follow(sample);
-        }
-        for kind in self.events.take_in(sample).into_iter().flatten() {
-            let time_s = sample.plant.time_s;
-            self.plot.event(&RunEvent { time_s, kind });
-        }
-        self.plot.tick(&RecordedTick {
-            sample,
-            estimates: self.replica.as_ref().map(Replica::telemetry),
-        });
+impl Sink for Drawing {
+    fn tick(&mut self, tick: &RecordedTick<'_>) -> Result<(), RecordError> {
+        self.plot.tick(tick);
         Ok(())
     }
 
-    fn event(&mut self, time_s: f64, event: Event) {
-        let kind = EventKind::Plant(event);
-        self.plot.event(&RunEvent { time_s, kind });
+    fn event(&mut self, event: &RunEvent) -> Result<(), RecordError> {
+        self.plot.event(event);
+        Ok(())
+    }
+
+    fn finish(self: Box<Self>) -> Result<Option<AtomicFile>, RecordError> {
+        // Its receiver waits for it.
+        let _ = self.svg.send(self.plot.svg());
+        Ok(None)
     }
 }
 

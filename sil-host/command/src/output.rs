@@ -214,12 +214,10 @@ impl Monitor for Output {
     }
 
     fn sample(&mut self, sample: &Sample) -> Result<(), LoopError> {
-        if let Some(recorder) = &mut self.recorder {
-            recorder
-                .push(sample)
-                .map_err(|error| LoopError::Monitor(Box::new(error)))?;
+        match &mut self.recorder {
+            Some(recorder) => recorder.sample(sample),
+            None => Ok(()),
         }
-        Ok(())
     }
 
     fn event(&mut self, time_s: f64, event: Event) {

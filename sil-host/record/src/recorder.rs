@@ -14,6 +14,7 @@ use std::thread::{self, JoinHandle};
 use painleve_chart::picture::PictureError;
 use painleve_files::atomic_file::{AtomicFile, AtomicFileError, commit_all};
 use painleve_firmware::telemetry::Telemetry;
+use painleve_plant::closed_loop::{LoopError, Monitor};
 use painleve_plant::sample::Sample;
 use painleve_plant::{Configuration, Event};
 
@@ -226,6 +227,17 @@ impl Recorder {
         };
         drop(full);
         thread.join().unwrap_or(Err(RecordError::Ended))
+    }
+}
+
+impl Monitor for Recorder {
+    fn sample(&mut self, sample: &Sample) -> Result<(), LoopError> {
+        let pushed = self.push(sample);
+        pushed.map_err(|error| LoopError::Monitor(Box::new(error)))
+    }
+
+    fn event(&mut self, time_s: f64, event: Event) {
+        self.push_event(time_s, event);
     }
 }
 

@@ -5,31 +5,17 @@ use std::fs;
 use std::path::Path;
 
 use boon::{Compiler, Schemas};
-use painleve_plant::closed_loop::{ClosedLoop, LoopError, Monitor};
+use painleve_plant::Snapshot;
+use painleve_plant::closed_loop::ClosedLoop;
 use painleve_plant::controller_host::InProcess;
 use painleve_plant::sample::Sample;
 use painleve_plant::simulation::Simulation;
-use painleve_plant::{Event, Snapshot};
 use serde_json::{Value, json};
 
 use crate::csv_table::CsvTable;
 use crate::export::ticks_to_csv;
 use crate::messages::event_schema;
 use crate::recorder::Recorder;
-
-/// Records a run of the closed loop.
-struct Recorded(Recorder);
-
-impl Monitor for Recorded {
-    fn sample(&mut self, sample: &Sample) -> Result<(), LoopError> {
-        self.0.push(sample).unwrap();
-        Ok(())
-    }
-
-    fn event(&mut self, time_s: f64, event: Event) {
-        self.0.push_event(time_s, event);
-    }
-}
 
 pub(crate) fn scenario(name: &str, overrides: &[&str]) -> Scenario {
     let overrides: Vec<String> = overrides.iter().map(|&text| text.into()).collect();
@@ -44,13 +30,13 @@ pub(crate) fn record(folder: &Path, scenario: &Scenario) -> (Vec<u8>, String) {
         Box::new(CsvTable::to(AtomicFile::create(&csv).unwrap()).unwrap()),
     ];
     let configuration = scenario.controller_configuration();
-    let mut recorded = Recorded(Recorder::start(&configuration, sinks).unwrap());
+    let mut recorder = Recorder::start(&configuration, sinks).unwrap();
     let host = InProcess::new(&configuration).unwrap();
     let mut closed_loop = ClosedLoop::new(Simulation::new(scenario).unwrap(), host);
     for _ in 0..scenario.run.ticks() {
-        closed_loop.tick(&mut recorded).unwrap();
+        closed_loop.tick(&mut recorder).unwrap();
     }
-    recorded.0.finish().unwrap();
+    recorder.finish().unwrap();
     (fs::read(mcap).unwrap(), fs::read_to_string(csv).unwrap())
 }
 
