@@ -250,9 +250,9 @@ fn answer_all(bus: &str) -> Outcome<()> {
         &bus.parse()?,
         None,
         Duration::from_secs(5),
+        PATIENCE,
         &Interrupt::default(),
     )?;
-    controller.set_silence_limit(PATIENCE);
     while let Received::Frame(frame) = controller.receive()? {
         controller.send(&ActuatorFrame {
             tick: frame.tick,

@@ -41,8 +41,8 @@ impl JoinArguments {
         interrupt: &Interrupt,
     ) -> Result<(ControllerEnd, Session, Configuration), CommandError> {
         let wait = Duration::from_secs_f64(self.wait_s);
-        let (mut end, session) = ControllerEnd::open(&self.bus, self.pair, wait, interrupt)?;
-        end.set_silence_limit(self.patience.peer());
+        let limit = self.patience.peer();
+        let (end, session) = ControllerEnd::open(&self.bus, self.pair, wait, limit, interrupt)?;
         let configuration = session
             .controller()
             .map_err(|source| ProcessError::Unreadable {

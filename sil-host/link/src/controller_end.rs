@@ -9,7 +9,7 @@ use super::bell::Bell;
 use super::claim::{Bus, Claim, remove_dead};
 use super::guardian::{CallMark, Guardian};
 use super::lock_file::{LockFile, Role};
-use super::patience::{AfterPause, DEFAULT_SILENCE_LIMIT, LOOK_INTERVAL, Patience, Silence};
+use super::patience::{AfterPause, LOOK_INTERVAL, Patience, Silence};
 use super::place::Place;
 use super::run_files::{OWN_CONTROLLER, RunFiles};
 use super::services::{
@@ -89,6 +89,10 @@ impl ControllerEnd {
     /// Joins the plant on `bus`, waiting at most `timeout` for it, and reads its session. With a
     /// `pair`, it joins only the plant of that pair; without one, only a plant that belongs to none.
     ///
+    /// `silence_limit` is how long the plant may be silent, from now on, before
+    /// [`LinkError::PlantSilent`] is returned; normally [`DEFAULT_SILENCE_LIMIT`](crate::DEFAULT_SILENCE_LIMIT). It must be longer
+    /// than a tick; choose a long one to stop the plant at breakpoints.
+    ///
     /// # Errors
     /// [`LinkError::PlantMissing`] after `timeout`,
     /// [`LinkError::PlantSilent`] if there is a plant that does not become ready,
@@ -99,9 +103,11 @@ impl ControllerEnd {
         bus: &BusName,
         pair: Option<Pair>,
         timeout: Duration,
+        silence_limit: Duration,
         interrupt: &Interrupt,
     ) -> Result<(Self, Session), LinkError> {
-        Self::open_in(Place::of_user()?, bus, pair, timeout, interrupt)
+        let place = Place::of_user()?;
+        Self::open_in(place, bus, pair, timeout, silence_limit, interrupt)
     }
 
     pub(super) fn open_in(
@@ -109,6 +115,7 @@ impl ControllerEnd {
         bus: &BusName,
         pair: Option<Pair>,
         timeout: Duration,
+        silence_limit: Duration,
         interrupt: &Interrupt,
     ) -> Result<(Self, Session), LinkError> {
         let start = Instant::now();
@@ -119,11 +126,11 @@ impl ControllerEnd {
         };
         let mut silence = Silence::default();
         loop {
-            match join(&bus, pair, interrupt)? {
+            match join(&bus, pair, silence_limit, interrupt)? {
                 Attempt::Joined(end, session) => return Ok((*end, session)),
                 Attempt::NoPlant => silence = Silence::default(),
                 Attempt::NotReady => {
-                    if let AfterPause::GiveUp(silence) = silence.grow(DEFAULT_SILENCE_LIMIT) {
+                    if let AfterPause::GiveUp(silence) = silence.grow(silence_limit) {
                         return Err(LinkError::PlantSilent {
                             bus: bus.name,
                             silence,
@@ -150,14 +157,6 @@ impl ControllerEnd {
     /// Returns the name of the bus.
     pub fn bus(&self) -> &BusName {
         self.ports.presence.bus()
-    }
-
-    /// Sets how long the plant may be silent before [`LinkError::PlantSilent`] is returned;
-    /// initially [`DEFAULT_SILENCE_LIMIT`]. The limit must be longer than a tick; choose a long one
-    /// to stop the plant at breakpoints.
-    pub fn set_silence_limit(&mut self, limit: Duration) {
-        self.silence_limit = limit;
-        self.patience = Patience::new(limit);
     }
 
     /// Waits for the next sensor frame or the end of the session.
@@ -318,7 +317,12 @@ impl ControllerEnd {
 }
 
 /// Tries to join the run of the plant on the bus.
-fn join(bus: &Bus, pair: Option<Pair>, interrupt: &Interrupt) -> Result<Attempt, LinkError> {
+fn join(
+    bus: &Bus,
+    pair: Option<Pair>,
+    silence_limit: Duration,
+    interrupt: &Interrupt,
+) -> Result<Attempt, LinkError> {
     let Some(lock) = bus.look().filter(|lock| lock.is_held(Role::Plant)) else {
         return Ok(Attempt::NoPlant);
     };
@@ -349,8 +353,8 @@ fn join(bus: &Bus, pair: Option<Pair>, interrupt: &Interrupt) -> Result<Attempt,
         ports,
         guardian,
         claim,
-        silence_limit: DEFAULT_SILENCE_LIMIT,
-        patience: Patience::new(DEFAULT_SILENCE_LIMIT),
+        silence_limit,
+        patience: Patience::new(silence_limit),
         interrupt: interrupt.clone(),
         ended: false,
     };

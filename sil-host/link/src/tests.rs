@@ -89,15 +89,22 @@ impl TestBus {
     }
 
     fn controller(&self, timeout: Duration) -> Result<(ControllerEnd, Session), LinkError> {
-        let (mut controller, session) = ControllerEnd::open_in(
+        self.controller_with(PATIENT, timeout)
+    }
+
+    fn controller_with(
+        &self,
+        silence_limit: Duration,
+        timeout: Duration,
+    ) -> Result<(ControllerEnd, Session), LinkError> {
+        ControllerEnd::open_in(
             self.place.clone(),
             &self.name,
             self.pair,
             timeout,
+            silence_limit,
             &Interrupt::default(),
-        )?;
-        controller.set_silence_limit(PATIENT);
-        Ok((controller, session))
+        )
     }
 
     /// Starts a controller in a thread that does this with its end and the session.
@@ -105,9 +112,18 @@ impl TestBus {
         &self,
         act: impl FnOnce(ControllerEnd, Session) -> T + Send + 'static,
     ) -> JoinHandle<T> {
+        self.spawn_with(PATIENT, act)
+    }
+
+    /// The same with another limit of the plant's silence.
+    fn spawn_with<T: Send + 'static>(
+        &self,
+        silence_limit: Duration,
+        act: impl FnOnce(ControllerEnd, Session) -> T + Send + 'static,
+    ) -> JoinHandle<T> {
         let bus = self.clone();
         thread::spawn(move || {
-            let (controller, session) = bus.controller(PATIENT).unwrap();
+            let (controller, session) = bus.controller_with(silence_limit, PATIENT).unwrap();
             act(controller, session)
         })
     }

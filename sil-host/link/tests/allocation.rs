@@ -111,8 +111,7 @@ fn frames_cross_the_link_without_allocation_on_either_end() {
 
     let controller = std::thread::spawn(move || {
         let (mut controller, _) =
-            ControllerEnd::open(&bus, None, PATIENT, &Interrupt::default()).unwrap();
-        controller.set_silence_limit(PATIENT);
+            ControllerEnd::open(&bus, None, PATIENT, PATIENT, &Interrupt::default()).unwrap();
         let mut before = 0;
         let mut after = 0;
         while let Received::Frame(frame) = controller.receive().unwrap() {

@@ -137,7 +137,14 @@ fn an_interrupt_ends_a_wait() {
         Err(LinkError::Interrupted)
     ));
     drop(plant);
-    let opened = ControllerEnd::open_in(bus.place.clone(), &bus.name, None, PATIENT, &interrupt);
+    let opened = ControllerEnd::open_in(
+        bus.place.clone(),
+        &bus.name,
+        None,
+        PATIENT,
+        PATIENT,
+        &interrupt,
+    );
     assert!(matches!(opened, Err(LinkError::Interrupted)));
     bus.assert_nothing_left();
 }

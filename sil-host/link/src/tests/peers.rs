@@ -112,15 +112,27 @@ fn a_silent_live_controller_is_detected() {
 fn a_silent_live_plant_is_detected() {
     let bus = TestBus::new();
     let mut plant = bus.plant().unwrap();
-    let controller = bus.spawn(move |mut controller, _| {
-        controller.set_silence_limit(SHORT);
-        controller.receive()
-    });
+    let controller = bus.spawn_with(5 * SHORT, |mut controller, _| controller.receive());
     plant.wait_for_controller(PATIENT).unwrap();
     assert!(matches!(
         controller.join().unwrap(),
         Err(LinkError::PlantSilent { .. })
     ));
+}
+
+/// To a stranger, the plant of a pair is one that does not become ready.
+#[test]
+fn the_silence_limit_covers_the_start() {
+    let stranger = TestBus::new();
+    let pair = TestBus {
+        pair: Some(Pair::unique()),
+        ..stranger.clone()
+    };
+    let _plant = pair.plant().unwrap();
+    match stranger.controller_with(SHORT, PATIENT).err().unwrap() {
+        LinkError::PlantSilent { silence, .. } => assert!(silence < DEFAULT_SILENCE_LIMIT),
+        other => panic!("{other}"),
+    }
 }
 
 #[test]
