@@ -23,8 +23,8 @@ use painleve_process::interrupt::Interrupt;
 /// start.
 const PLANT_POLL: Duration = Duration::from_millis(10);
 
-/// Time before a frame is due at which its receiver wakes up, to spin until that time after it. It covers the slack of Linux's
-/// timers (50 µs) and the start of an idle processor.
+/// Longest time before a frame is due at which its receiver wakes up, to spin until that time after it. It covers the slack
+/// of Linux's timers (50 µs) and the start of an idle processor.
 const WAKE_UP: Duration = Duration::from_micros(120);
 
 /// When a frame is expected in real time.
@@ -34,6 +34,37 @@ pub struct Expected {
     pub due: Instant,
     /// When to give it up.
     pub deadline: Instant,
+}
+
+/// What a wait for an expected frame does next.
+enum Wait {
+    /// Spin: the frame is about to arrive.
+    Spin,
+    /// Sleep, at most so long.
+    Sleep(Duration),
+    /// Give the frame up.
+    Missed,
+}
+
+impl Expected {
+    fn wait(&self, bell: &Bell) -> Wait {
+        let now = Instant::now();
+        let left = self.deadline.saturating_duration_since(now);
+        // A receiver that spins for all of a short tick keeps a whole processor busy, and under SCHED_FIFO the system then
+        // stops it for a part of every second.
+        let wake_up = WAKE_UP.min(self.deadline.saturating_duration_since(self.due));
+        let early = self.due.saturating_duration_since(now);
+        if left.is_zero() {
+            Wait::Missed
+        } else if early > wake_up {
+            Wait::Sleep(early - wake_up)
+        // While the plant needs this processor, it cannot send.
+        } else if now < self.due + wake_up && bell.peer_runs_elsewhere() {
+            Wait::Spin
+        } else {
+            Wait::Sleep(left)
+        }
+    }
 }
 
 /// Message received from the plant.
@@ -194,7 +225,6 @@ impl ControllerEnd {
         expected: Option<Expected>,
     ) -> Result<Option<Received>, LinkError> {
         let mut known_gone = false;
-        let mut longest = LOOK_INTERVAL;
         self.patience.begin(&self.ports.bell);
         loop {
             if let Some(frame) = self.take()? {
@@ -214,24 +244,20 @@ impl ControllerEnd {
                     bus: self.bus().clone(),
                 });
             }
-            if let Some(expected) = expected {
-                let now = Instant::now();
-                longest = expected.deadline.saturating_duration_since(now);
-                if longest.is_zero() {
-                    return Ok(None);
+            let bell = &self.ports.bell;
+            let wait = expected.map(|expected| expected.wait(bell));
+            let next = match wait {
+                None => self.patience.pause(bell, LOOK_INTERVAL),
+                Some(Wait::Spin) => {
+                    std::hint::spin_loop();
+                    continue;
                 }
-                let early = expected
-                    .due
-                    .saturating_duration_since(now)
-                    .saturating_sub(WAKE_UP);
-                if !early.is_zero() {
-                    longest = early;
-                    self.patience.stop_spinning();
-                } else if now < expected.due + WAKE_UP {
-                    self.patience.spin_again(&self.ports.bell);
-                }
-            }
-            match self.patience.pause(&self.ports.bell, longest) {
+                Some(Wait::Sleep(longest)) => self.patience.rest(bell, longest),
+                // However late this process is, it notices a plant that has left.
+                Some(Wait::Missed) => self.patience.count(),
+            };
+            match next {
+                AfterPause::Poll if matches!(wait, Some(Wait::Missed)) => return Ok(None),
                 AfterPause::Poll => {}
                 AfterPause::Look if self.interrupt.is_requested() => {
                     return Err(LinkError::Interrupted);

@@ -132,43 +132,39 @@ impl Patience {
         self.pauses.begin(bell);
     }
 
-    /// Sleeps in the pauses that follow.
-    pub(super) fn stop_spinning(&mut self) {
-        self.pauses.polls = SPIN_POLLS;
-    }
-
-    /// Spins in the pauses that follow, as at the beginning of the wait, unless the peer needs this processor. It
-    /// does not arm the bell: the last poll lies behind, so a message that has arrived since would be slept over.
-    pub(super) fn spin_again(&mut self, bell: &Bell) {
-        if bell.peer_runs_elsewhere() {
-            self.pauses.polls = 0;
-        }
-    }
-
     /// Pauses once, at most `longest`, and returns the next step.
     #[inline]
     pub(super) fn pause(&mut self, bell: &Bell, longest: Duration) -> AfterPause {
         if self.pauses.spin() {
             AfterPause::Poll
         } else {
-            self.pause_longer(bell, longest)
+            self.rest(bell, longest)
         }
     }
 
+    /// Sleeps instead of spinning, at most `longest`, and returns the next step.
     #[cold]
-    fn pause_longer(&mut self, bell: &Bell, longest: Duration) -> AfterPause {
-        let counted = self.silence.is_some();
-        let silence = self.silence.get_or_insert_default();
-        let next = if counted {
-            silence.grow(self.limit)
-        } else {
-            AfterPause::Poll
-        };
+    pub(super) fn rest(&mut self, bell: &Bell, longest: Duration) -> AfterPause {
+        let next = self.count();
         if let AfterPause::Poll = next {
-            let left = self.limit.saturating_sub(silence.total);
+            let left = match &self.silence {
+                Some(silence) => self.limit.saturating_sub(silence.total),
+                None => self.limit,
+            };
             self.pauses.sleep(bell, longest.min(left));
         }
         next
+    }
+
+    /// Counts the silence without a pause, and returns the next step.
+    pub(super) fn count(&mut self) -> AfterPause {
+        match &mut self.silence {
+            Some(silence) => silence.grow(self.limit),
+            none => {
+                *none = Some(Silence::default());
+                AfterPause::Poll
+            }
+        }
     }
 }
 
@@ -232,12 +228,10 @@ mod tests {
         peers.ring();
         pauses.pause(&own, far);
         assert_eq!((pauses.polls, pauses.is_armed), (1, false));
-        // Nor does a wait that is to spin for a frame that is due.
+        // Nor does the first rest of a wait that does not spin.
         let mut patience = Patience::new(far);
-        patience.stop_spinning();
         peers.ring();
-        patience.spin_again(&own);
-        patience.pause(&own, far);
+        patience.rest(&own, far);
         assert!(start.elapsed() < LOOK_INTERVAL);
         assert!(patience.pauses.is_armed);
     }

@@ -17,6 +17,7 @@ use super::*;
 mod exchange;
 mod files;
 mod peers;
+mod real_time;
 mod session_model;
 
 /// Longer than any pause of a busy test machine.
