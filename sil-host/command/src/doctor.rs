@@ -2,12 +2,12 @@
 
 use clap::Args;
 use nix::sys::resource::{Resource, getrlimit};
-use nix::sys::statvfs::statvfs;
 use nix::sys::utsname::uname;
 use painleve_board::emulator;
 use painleve_firmware::SOURCES;
 use painleve_link::{BusState, LinkError, SegmentState, Survey};
 use painleve_plant::law_choice::build;
+use painleve_process::free_space::free_bytes;
 use painleve_process::realtime::request_realtime;
 use painleve_process::terminal;
 
@@ -137,11 +137,9 @@ fn limit(resource: Resource, least: u64) -> String {
 }
 
 fn free(folder: &str) -> String {
-    match statvfs(folder) {
-        Ok(state) => format!(
-            "{folder}, {} MB free",
-            state.blocks_available() * state.fragment_size() / 1_000_000
-        ),
+    match free_bytes(folder) {
+        Ok(Some(free)) => format!("{folder}, {} MB free", free / 1_000_000),
+        Ok(None) => format!("{folder}, unlimited"),
         Err(error) => format!("{folder}: {error}"),
     }
 }

@@ -5,7 +5,6 @@ use std::io;
 use std::time::{Duration, Instant};
 
 use iceoryx2::port::update_connections::UpdateConnections;
-use nix::sys::statvfs::statvfs;
 use painleve_shared::frame::{ActuatorFrame, SensorFrame};
 
 use super::bell::Bell;
@@ -20,6 +19,7 @@ use super::run_files::{OWN_CONTROLLER, RunFiles};
 use super::services::{Presence, Receiver, Sender, Services, receiver, sender, transport};
 use super::session::{Session, SessionMessage};
 use super::{BusName, LinkError, Pair};
+use painleve_process::free_space::free_bytes;
 use painleve_process::interrupt::Interrupt;
 
 /// Time allowed for the controller of a killed plant to leave the bus. It is shorter than the
@@ -418,16 +418,15 @@ fn take_over(bus: &Bus, interrupt: &Interrupt) -> Result<Claim, LinkError> {
 }
 
 fn check_shared_memory(bus: &BusName) -> Result<(), LinkError> {
-    let state =
-        statvfs(SHARED_MEMORY).map_err(|cause| transport(bus, "look at shared memory", cause))?;
-    let available = state.blocks_available() * state.fragment_size();
-    if available >= SHARED_MEMORY_NEEDED {
-        return Ok(());
+    let free = free_bytes(SHARED_MEMORY)
+        .map_err(|cause| transport(bus, "look at shared memory", cause))?;
+    match free.filter(|free| *free < SHARED_MEMORY_NEEDED) {
+        None => Ok(()),
+        Some(available) => Err(LinkError::SharedMemoryFull {
+            bus: bus.clone(),
+            folder: SHARED_MEMORY,
+            available,
+            needed: SHARED_MEMORY_NEEDED,
+        }),
     }
-    Err(LinkError::SharedMemoryFull {
-        bus: bus.clone(),
-        folder: SHARED_MEMORY,
-        available,
-        needed: SHARED_MEMORY_NEEDED,
-    })
 }
