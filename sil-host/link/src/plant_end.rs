@@ -154,7 +154,7 @@ impl PlantEnd {
     /// Waits until a controller has read the session and is ready for frames.
     ///
     /// # Errors
-    /// [`LinkError::ControllerMissing`] after `timeout`; the call may be repeated.
+    /// [`LinkError::ControllerMissing`] if none has joined after `timeout`; the call may be repeated.
     /// [`LinkError::ControllerSilent`] if a controller has joined but is not ready within the
     /// silence limit. [`LinkError::Interrupted`], [`LinkError::Transport`].
     pub fn wait_for_controller(&mut self, timeout: Duration) -> Result<(), LinkError> {
@@ -181,13 +181,13 @@ impl PlantEnd {
                 return Err(LinkError::Interrupted);
             }
             let waited = start.elapsed();
-            if waited >= timeout {
+            if waited >= timeout && !self.run.is_joined() {
                 return Err(LinkError::ControllerMissing {
                     bus: self.bus().clone(),
                     waited,
                 });
             }
-            std::thread::sleep(CONTROLLER_POLL.min(timeout - waited));
+            std::thread::sleep(CONTROLLER_POLL);
         }
     }
 

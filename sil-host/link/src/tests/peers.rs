@@ -1,6 +1,8 @@
 //! Ends that are missing, refused, silent, or leave without ending the session.
 
 use super::*;
+use crate::lock_file::Role;
+use crate::run_files::RunFiles;
 
 /// Polls for an answer until there is an error.
 fn error_of(plant: &mut PlantEnd) -> LinkError {
@@ -77,6 +79,22 @@ fn the_error_about_a_missing_controller_names_the_command_to_start() {
         plant.exchange(&sensor(0)),
         Err(LinkError::ControllerGone { .. })
     ));
+}
+
+#[test]
+fn a_controller_that_is_slow_to_start_is_not_missing() {
+    let bus = TestBus::new();
+    let mut plant = bus.plant().unwrap();
+    plant.set_silence_limit(2 * SHORT);
+    let bus = bus.bus();
+    let _claim = bus.claim(Role::Controller).unwrap().ok().unwrap();
+    let run = RunFiles::ready(&bus.folder(), &bus.place, None).unwrap();
+    assert!(run.join().unwrap());
+    let error = plant.wait_for_controller(SHORT).unwrap_err();
+    assert!(
+        matches!(error, LinkError::ControllerSilent { .. }),
+        "{error}"
+    );
 }
 
 #[test]
