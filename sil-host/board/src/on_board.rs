@@ -34,7 +34,7 @@ impl<B: ConnectedBoard> ControllerHost for OnBoard<B> {
         self.times.push(&answer.frame, answer.cost);
         Ok(Answer {
             frame: Some(answer.frame),
-            round_trip,
+            round_trip: Some(round_trip),
         })
     }
 }

@@ -135,9 +135,15 @@ fn add_lockstep_turn(round_trips: &mut RoundTrips, processors: &Processors) -> O
     );
     controller.pin(processors)?;
     plant.wait_for_controller(Duration::from_secs(5))?;
-    let mut closed_loop = ClosedLoop::new(Simulation::new(&scenario)?, Lockstep(plant));
+    let mut closed_loop = ClosedLoop::new(
+        Simulation::new(&scenario)?,
+        Lockstep {
+            end: plant,
+            skip: Duration::ZERO,
+        },
+    );
     round_trips.add_turn(|| closed_loop.tick(&mut ()))?;
-    closed_loop.finish().1.0.end()?;
+    closed_loop.finish().1.end.end()?;
     controller.0.wait()?;
     Ok(())
 }

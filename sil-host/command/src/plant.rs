@@ -152,8 +152,12 @@ fn simulate(
             }
         }
         Pacing::Lockstep | Pacing::Realtime => {
-            let (result, host, wall) = drive(scenario, simulation, Lockstep(end), output)?;
-            host.0.end()?;
+            let skip = match pacing {
+                Pacing::Lockstep => Duration::ZERO,
+                Pacing::Realtime => Duration::from_secs(1) / scenario.run.tick_hz,
+            };
+            let (result, host, wall) = drive(scenario, simulation, Lockstep { end, skip }, output)?;
+            host.end.end()?;
             RunReport::new(scenario, name, pacing.name(), &result, wall)
         }
     };

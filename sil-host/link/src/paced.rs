@@ -47,30 +47,41 @@ impl Paced {
     }
 }
 
-impl ControllerHost for Paced {
-    fn exchange(&mut self, frame: &SensorFrame) -> Result<Answer, HostError> {
+impl Paced {
+    /// Spends a tick: sends its frame, unless it is lost, and waits for the answer and for the clock.
+    fn spend(&mut self, frame: Option<&SensorFrame>) -> Result<Answer, HostError> {
         let start = Instant::now();
-        self.end.send(frame).map_err(HostError::new)?;
-        let mut answer = None;
-        let mut late_fault = None;
-        let mut round_trip = self.period;
+        if let Some(frame) = frame {
+            self.end.send(frame).map_err(HostError::new)?;
+        }
+        let mut answer = Answer::default();
         let deadline = start + self.patience;
         while let Some(received) = self.end.receive_before(deadline).map_err(HostError::new)? {
-            if received.tick == frame.tick {
-                answer = Some(received);
-                round_trip = start.elapsed();
+            if frame.is_some_and(|frame| frame.tick == received.tick) {
+                answer = Answer {
+                    frame: Some(received),
+                    round_trip: Some(start.elapsed()),
+                };
                 break;
             }
             // A late answer to a tick that was given up.
-            late_fault = received.latched_fault().map(|_| received);
+            answer.frame = received.latched_fault().map(|_| received);
         }
         let late = self.pacer.wait().map_err(HostError::new)?;
         let nanoseconds = u64::try_from(late.as_nanos()).unwrap_or(u64::MAX);
         self.lateness_ns.saturating_record(nanoseconds);
         self.missed_deadlines += u64::from(late >= self.period);
-        Ok(Answer {
-            frame: answer.or(late_fault),
-            round_trip,
-        })
+        Ok(answer)
+    }
+}
+
+impl ControllerHost for Paced {
+    fn exchange(&mut self, frame: &SensorFrame) -> Result<Answer, HostError> {
+        self.spend(Some(frame))
+    }
+
+    /// The controller may report a fault meanwhile, because it misses the frame.
+    fn skip(&mut self) -> Result<Answer, HostError> {
+        self.spend(None)
     }
 }

@@ -266,35 +266,36 @@ impl<H: ControllerHost, P: Plant> ClosedLoop<H, P> {
         };
         let sensor = self.simulation.sample(&mut probe)?;
         self.log.sensor(&sensor);
-        let frame = if self.simulation.sensor_frame_is_lost() {
-            None
+        let Answer { frame, round_trip } = if self.simulation.sensor_frame_is_lost() {
+            self.host.skip()?
         } else {
-            let Answer { frame, round_trip } = self.host.exchange(&sensor)?;
+            self.host.exchange(&sensor)?
+        };
+        if let Some(round_trip) = round_trip {
             let nanoseconds = u64::try_from(round_trip.as_nanos()).unwrap_or(u64::MAX);
             let nanoseconds = nanoseconds.min(LONGEST_ROUND_TRIP_NS);
             self.round_trips_ns
                 .record(nanoseconds)
                 .unwrap_or_else(|_| unreachable!("the histogram grows up to its upper bound"));
-            frame
-        };
-        match &frame {
-            Some(answer) => {
-                if !answer.is_understood() {
-                    return Err(LoopError::NotUnderstood {
-                        state: answer.state,
-                        fault: answer.fault,
-                    });
-                }
-                self.log.actuator(answer);
-                self.last_answer = *answer;
-                let saturated = painleve_shared::frame::StatusFlags::SATURATED;
-                self.saturated_ticks += u64::from(answer.flags.contains(saturated));
-            }
-            None => self.stale_ticks += 1,
         }
+        if let Some(answer) = &frame {
+            if !answer.is_understood() {
+                return Err(LoopError::NotUnderstood {
+                    state: answer.state,
+                    fault: answer.fault,
+                });
+            }
+            self.log.actuator(answer);
+            self.last_answer = *answer;
+            let saturated = painleve_shared::frame::StatusFlags::SATURATED;
+            self.saturated_ticks += u64::from(answer.flags.contains(saturated));
+        }
+        // A late answer that reports a fault takes effect, but does not answer this tick.
+        let answered = frame.is_some_and(|answer| answer.tick == sensor.tick);
+        self.stale_ticks += u64::from(!answered);
         if monitor.wants_samples() {
             monitor.sample(&Sample {
-                answered: frame.is_some_and(|answer| answer.tick == sensor.tick),
+                answered,
                 ..self.simulation.describe(&sensor, &self.last_answer)
             })?;
         }
@@ -336,21 +337,24 @@ mod tests {
     use crate::scenario::{Scenario, built_in};
 
     /// Answers every frame with the same state and fault.
+    #[derive(Default)]
     struct Fixed {
         state: u8,
         fault: u8,
+        /// Ticks by which the answers are late.
+        late: u32,
     }
 
     impl ControllerHost for Fixed {
         fn exchange(&mut self, frame: &SensorFrame) -> Result<Answer, HostError> {
             Ok(Answer {
                 frame: Some(ActuatorFrame {
-                    tick: frame.tick,
+                    tick: frame.tick.wrapping_sub(self.late),
                     state: self.state,
                     fault: self.fault,
                     ..ActuatorFrame::default()
                 }),
-                round_trip: std::time::Duration::ZERO,
+                round_trip: None,
             })
         }
     }
@@ -360,9 +364,31 @@ mod tests {
         let scenario = Scenario::load(built_in::DEFAULT, &[]).unwrap();
         for (state, fault, understood) in [(0, 0, true), (255, 0, false), (0, 255, false)] {
             let simulation = Simulation::new(&scenario).unwrap();
-            let ticked = ClosedLoop::new(simulation, Fixed { state, fault }).tick(&mut ());
+            let fixed = Fixed {
+                state,
+                fault,
+                late: 0,
+            };
+            let ticked = ClosedLoop::new(simulation, fixed).tick(&mut ());
             let refused = matches!(ticked, Err(LoopError::NotUnderstood { .. }));
             assert_eq!(refused, !understood, "{state}, {fault}: {ticked:?}");
+        }
+    }
+
+    #[test]
+    fn a_late_answer_leaves_its_tick_without_one() {
+        let scenario = Scenario::load(built_in::DEFAULT, &[]).unwrap();
+        for (late, stale_ticks) in [(0, 0), (1, 1)] {
+            let simulation = Simulation::new(&scenario).unwrap();
+            let host = Fixed {
+                late,
+                ..Fixed::default()
+            };
+            let mut closed_loop = ClosedLoop::new(simulation, host);
+            closed_loop.tick(&mut ()).unwrap();
+            let (result, _) = closed_loop.finish();
+            assert_eq!(result.stale_ticks, stale_ticks);
+            assert!(result.round_trips_ns.is_empty());
         }
     }
 }

@@ -11,12 +11,13 @@ use painleve_shared::range::OutOfRange;
 use crate::{Configuration, Controller};
 
 /// The answer to one sensor frame.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub struct Answer {
     /// The controller's frame; `None` if it did not arrive in time.
     pub frame: Option<ActuatorFrame>,
-    /// Time from sending the sensor frame to receiving the answer; zero for a library call.
-    pub round_trip: Duration,
+    /// Time from sending the sensor frame to receiving its answer; `None` if it did not arrive in time, and for a library
+    /// call.
+    pub round_trip: Option<Duration>,
 }
 
 /// Failure of a host, with the host's own error as the reason.
@@ -38,6 +39,14 @@ pub trait ControllerHost {
     /// # Errors
     /// [`HostError`] if the controller is no longer available.
     fn exchange(&mut self, frame: &SensorFrame) -> Result<Answer, HostError>;
+
+    /// Lets a tick pass whose frame is lost. In real time it lasts as long as any other.
+    ///
+    /// # Errors
+    /// As [`ControllerHost::exchange`].
+    fn skip(&mut self) -> Result<Answer, HostError> {
+        Ok(Answer::default())
+    }
 }
 
 /// The controller in this process.
@@ -63,7 +72,7 @@ impl ControllerHost for InProcess {
         Ok(Answer {
             frame: Some(self.controller.tick(frame)),
             // Reading the clock twice would cost a tenth of a tick.
-            round_trip: Duration::ZERO,
+            round_trip: None,
         })
     }
 }

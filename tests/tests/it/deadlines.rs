@@ -46,6 +46,20 @@ fn a_delayed_controller_ends_the_run_with_a_fault_and_its_exit_code() {
     assert!(bench.leftovers().is_empty(), "{:?}", bench.leftovers());
 }
 
+#[test]
+fn a_tick_whose_frame_is_lost_takes_its_time() {
+    let bench = Bench::new("lost");
+    let mut arguments = vec!["run", "--pacing", "realtime", "--bus", &bench.bus];
+    arguments.extend(["--json", "--no-record", "--no-plot"]);
+    arguments.extend(["--set", "run.duration_s=2"]);
+    arguments.extend(["--set", "converters.link.frame_loss=0.5"]);
+    arguments.extend(SLOW.iter().flat_map(|key| ["--set", key]));
+    let output = bench.run(&arguments);
+    let report: Value = serde_json::from_slice(&output.stdout).expect("a whole report");
+    let factor = report["realtime_factor"].as_f64().unwrap();
+    assert!((0.9..1.1).contains(&factor), "{report}");
+}
+
 /// The arm at rest, pressing with 10 N, as the plant of a native controller.
 struct Pressing {
     end: PlantEnd,

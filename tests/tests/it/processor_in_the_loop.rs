@@ -76,7 +76,7 @@ impl ControllerHost for Both {
         );
         Ok(Answer {
             frame: Some(native),
-            round_trip: start.elapsed(),
+            round_trip: Some(start.elapsed()),
         })
     }
 }

@@ -253,7 +253,7 @@ impl<B: Far> ControllerHost for Disturbed<B> {
         let is_lost = fault.is_some_and(Fault::loses_the_answer);
         Ok(Answer {
             frame: answer.filter(|_| !is_lost),
-            round_trip: Duration::ZERO,
+            round_trip: None,
         })
     }
 }

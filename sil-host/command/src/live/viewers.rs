@@ -3,7 +3,6 @@
 use std::cell::Cell;
 use std::rc::Rc;
 use std::sync::Arc;
-use std::time::Duration;
 
 use painleve_firmware::telemetry::Telemetry;
 use painleve_plant::closed_loop::{LoopError, Monitor};
@@ -42,7 +41,7 @@ impl ControllerHost for Host {
         };
         Ok(Answer {
             frame: Some(frame),
-            round_trip: Duration::ZERO,
+            round_trip: None,
         })
     }
 }

@@ -1,5 +1,9 @@
 //! Exchange of messages between two ends.
 
+use std::time::Instant;
+
+use painleve_plant::controller_host::ControllerHost;
+
 use super::*;
 
 #[test]
@@ -79,6 +83,18 @@ fn answers_are_received_without_waiting() {
     assert_eq!(answered, [0, 1, 2]);
     plant.end().unwrap();
     controller.join().unwrap().unwrap();
+}
+
+#[test]
+fn a_lost_frame_takes_the_time_of_a_board_that_keeps_it() {
+    let bus = TestBus::new();
+    let mut plant = lockstep::Lockstep {
+        end: bus.plant().unwrap(),
+        skip: SHORT,
+    };
+    let start = Instant::now();
+    assert!(plant.skip().unwrap().frame.is_none());
+    assert!(start.elapsed() >= SHORT);
 }
 
 #[test]

@@ -4,8 +4,6 @@
 // Helpers of tests may panic as tests do.
 #![allow(clippy::unwrap_used)]
 
-use std::time::Duration;
-
 use painleve_plant::closed_loop::{ClosedLoop, LoopError, Monitor};
 use painleve_plant::controller_host::{Answer, ControllerHost, HostError};
 use painleve_plant::sample::Sample;
@@ -58,7 +56,7 @@ impl ControllerHost for Alternate {
                 Channel::Frame => {
                     return Ok(Answer {
                         frame: Some(*self.controller.last_answer()),
-                        round_trip: Duration::ZERO,
+                        round_trip: None,
                     });
                 }
                 Channel::Repeated => received = self.last,
@@ -67,7 +65,7 @@ impl ControllerHost for Alternate {
         self.last = *frame;
         Ok(Answer {
             frame: Some(self.controller.tick(&received)),
-            round_trip: Duration::ZERO,
+            round_trip: None,
         })
     }
 }
