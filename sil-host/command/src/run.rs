@@ -128,9 +128,11 @@ pub struct RunArguments {
 /// generous.
 const START_WAIT_S: f64 = 10.0;
 
-/// Time for the plant to notice and report that the controller is gone. Even with a forced stop
-/// after that, all processes end within 2 s.
+/// Time for the plant to notice and report that the controller is gone.
 const PLANT_NOTICE: Duration = Duration::from_millis(1000);
+
+/// Time for the plant to complete its files, whatever it is asked. All processes end within 5 s, even if it is killed then.
+const PLANT_END: Duration = Duration::from_millis(3000);
 
 /// Time beyond the silence limit for which a child may be stopped, so that its peer reports the
 /// silence first.
@@ -227,6 +229,7 @@ pub fn run(arguments: &RunArguments) -> Result<(), CommandError> {
         quiet: arguments.quiet,
     });
     let mut plant = RunProcess::start(&plan, Stdio::inherit())?;
+    plant.child.set_grace(PLANT_END);
     // The controller's messages are shown only if the plant has none; a log is shown at once.
     let stderr = if arguments.image.log {
         Stdio::inherit()
@@ -314,6 +317,15 @@ fn peer_failure(
         "" => failure(status),
         message => ProcessError::Reported(message.into()).into(),
     })
+}
+
+/// Returns the first error among the messages of a failed controller, unless it only tells that its plant is gone or
+/// that somebody has ended it.
+fn cause(complaint: &str) -> Option<&str> {
+    let mut lines = complaint.lines();
+    let cause = lines.find_map(|line| line.strip_prefix("error: "))?;
+    let is_consequence = cause.starts_with("the plant on bus `") || cause == "interrupted";
+    (!is_consequence).then_some(cause)
 }
 
 /// Waits for the end of the plant, and stops it if necessary.

@@ -35,25 +35,36 @@ pub fn end_with_parent(command: &mut Command, signal: Signal) -> &mut Command {
 }
 
 /// A child that is ended, by force if necessary, when this value is dropped.
-pub struct Guarded(Child);
+pub struct Guarded {
+    child: Child,
+    grace: Duration,
+}
 
-/// Time between asking a child to end and killing it.
+/// Time between asking a child to end and killing it, unless set otherwise.
 const GRACE: Duration = Duration::from_millis(1000);
 
 impl Guarded {
     /// Takes ownership of a child.
     pub fn new(child: Child) -> Self {
-        Self(child)
+        Self {
+            child,
+            grace: GRACE,
+        }
+    }
+
+    /// Sets the time between asking the child to end and killing it.
+    pub fn set_grace(&mut self, grace: Duration) {
+        self.grace = grace;
     }
 
     /// Returns the child, for its pipes.
     pub fn child(&mut self) -> &mut Child {
-        &mut self.0
+        &mut self.child
     }
 
     /// Returns the child's process id.
     pub fn id(&self) -> u32 {
-        self.0.id()
+        self.child.id()
     }
 
     /// Returns the child's exit status, if it has ended.
@@ -61,12 +72,12 @@ impl Guarded {
     /// # Errors
     /// If the system cannot report it.
     pub fn ended(&mut self) -> io::Result<Option<ExitStatus>> {
-        self.0.try_wait()
+        self.child.try_wait()
     }
 
     /// Returns whether the child is stopped, as by SIGSTOP.
     pub fn is_stopped(&self) -> bool {
-        let Ok(id) = i32::try_from(self.0.id()) else {
+        let Ok(id) = i32::try_from(self.child.id()) else {
             return false;
         };
         // WNOWAIT leaves the exit status for `ended`.
@@ -80,22 +91,22 @@ impl Guarded {
     /// Kills the child.
     pub fn kill(&mut self) {
         // An error means that the child has just ended.
-        let _ = self.0.kill();
-        let _ = self.0.wait();
+        let _ = self.child.kill();
+        let _ = self.child.wait();
     }
 
     /// Asks the child to end, waits, then kills it; returns its exit status.
     pub fn stop(&mut self) -> Option<ExitStatus> {
-        if let Ok(Some(status)) = self.0.try_wait() {
+        if let Ok(Some(status)) = self.child.try_wait() {
             return Some(status);
         }
-        if let Ok(id) = i32::try_from(self.0.id()) {
+        if let Ok(id) = i32::try_from(self.child.id()) {
             // An error means that the child has just ended.
             let _ = kill(Pid::from_raw(id), Signal::SIGTERM);
         }
         let asked = Instant::now();
-        while asked.elapsed() < GRACE {
-            if let Ok(Some(status)) = self.0.try_wait() {
+        while asked.elapsed() < self.grace {
+            if let Ok(Some(status)) = self.child.try_wait() {
                 return Some(status);
             }
             if self.is_stopped() {
@@ -105,7 +116,7 @@ impl Guarded {
             std::thread::sleep(Duration::from_millis(5));
         }
         self.kill();
-        self.0.wait().ok()
+        self.child.wait().ok()
     }
 }
 

@@ -306,7 +306,7 @@ fn ctrl_c_ends_a_run_tidily() {
 #[test]
 fn ctrl_c_while_the_last_figure_is_written_does_not_undo_the_run() {
     let bench = Bench::new("late");
-    let converter = "#!/bin/sh\n[ $1 = --version ] && exit\ncat > given\nsleep 0.3\necho figure\n";
+    let converter = "#!/bin/sh\n[ $1 = --version ] && exit\ncat > given\nsleep 1.5\necho figure\n";
     std::fs::write(bench.path("rsvg-convert"), converter).unwrap();
     let executable = std::fs::Permissions::from_mode(0o755);
     std::fs::set_permissions(bench.path("rsvg-convert"), executable).unwrap();
