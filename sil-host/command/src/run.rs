@@ -141,8 +141,8 @@ const STOPPED_MARGIN: Duration = Duration::from_millis(200);
 /// Time for the controller to end after the plant.
 const CONTROLLER_END: Duration = Duration::from_millis(1700);
 
-/// Time for a bridge to end after the plant has reported it missing.
-const BRIDGE_END: Duration = Duration::from_millis(300);
+/// Time for the controller to end after the plant has reported it missing.
+const CONTROLLER_NOTICE: Duration = Duration::from_millis(300);
 
 /// Runs a scenario that is watched and steered from a page; `command` runs it, too.
 fn live(
@@ -254,12 +254,7 @@ pub fn run(arguments: &RunArguments) -> Result<(), CommandError> {
     let deadlines_missed = status.code() == Some(i32::from(DEADLINES_MISSED));
     if !status.success() && !deadlines_missed {
         if status.code() == Some(i32::from(PEER_FAILED)) {
-            return Err(peer_failure(
-                arguments.host,
-                &mut plant,
-                &mut controller,
-                status,
-            )?);
+            return Err(peer_failure(&mut plant, &mut controller, status)?);
         }
         return Err(failure(status));
     }
@@ -296,22 +291,17 @@ pub fn run(arguments: &RunArguments) -> Result<(), CommandError> {
 }
 
 /// Returns the failure of a plant whose peer has failed. The plant only knows that the controller has
-/// gone; the bridge of a board knows why.
+/// gone; the controller or the bridge of a board knows why.
 fn peer_failure(
-    host: Host,
     plant: &mut RunProcess,
     controller: &mut RunProcess,
     status: ExitStatus,
 ) -> Result<CommandError, CommandError> {
     let message = plant.stdout.text();
-    if host != Host::Native
-        && (controller.wait(BRIDGE_END)?).is_some_and(|status| !status.success())
+    if (controller.wait(CONTROLLER_NOTICE)?).is_some_and(|status| !status.success())
+        && let Some(cause) = cause(&controller.stderr.text())
     {
-        let complaint = controller.stderr.text();
-        let mut lines = complaint.lines();
-        if let Some(cause) = lines.find_map(|line| line.strip_prefix("error: ")) {
-            return Ok(ProcessError::Reported(cause.into()).into());
-        }
+        return Ok(ProcessError::Reported(cause.into()).into());
     }
     Ok(match message.trim() {
         "" => failure(status),
@@ -354,6 +344,10 @@ fn watch(
                 return Ok(plant_status);
             }
             if !plant.child.is_stopped() {
+                // The plant may be completing the files of its run.
+                if let Some(completed) = plant.child.stop().filter(ExitStatus::success) {
+                    return Ok(completed);
+                }
                 return Err(ProcessError::EndedEarly {
                     process: "controller",
                     status,
@@ -410,5 +404,25 @@ fn failure(status: ExitStatus) -> CommandError {
             status,
             complaint: String::new(),
         }),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use painleve_link::LinkError;
+
+    #[test]
+    fn the_cause_of_a_failure_is_no_consequence_of_it() {
+        let bus: BusName = "b".parse().unwrap();
+        let gone = LinkError::PlantGone { bus: bus.clone() };
+        let silence = Duration::from_secs(2);
+        let silent = LinkError::PlantSilent { bus, silence };
+        for consequence in [gone, silent, LinkError::Interrupted] {
+            assert_eq!(cause(&format!("error: {consequence}\n")), None);
+        }
+        let bug = "controller: real time\nerror: this is a bug in painleve\nerror: interrupted\n";
+        assert_eq!(cause(bug), Some("this is a bug in painleve"));
+        assert_eq!(cause(""), None);
     }
 }
