@@ -10,7 +10,7 @@ use std::io::{self, PipeReader, PipeWriter, Read, Write};
 use std::os::fd::AsFd;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use command_fds::{CommandFdExt, FdMapping};
 use nix::errno::Errno;
@@ -227,7 +227,8 @@ impl Emulator {
     }
 
     fn wait_for_bytes(&mut self) -> Result<(), BoardError> {
-        let start = Instant::now();
+        // Counts looks instead of time: the time passes also while this process is stopped together with QEMU.
+        let mut silence = Duration::ZERO;
         loop {
             let look = PollTimeout::try_from(LOOK_INTERVAL).unwrap_or(PollTimeout::ZERO);
             let mut pipes = [PollFd::new(self.responses.as_fd(), PollFlags::POLLIN)];
@@ -239,8 +240,9 @@ impl Emulator {
             if let Some(status) = self.process.ended()? {
                 return Err(BoardError::Ended(status));
             }
-            if start.elapsed() > self.silence_limit {
-                return Err(BoardError::Silent(start.elapsed()));
+            silence += LOOK_INTERVAL;
+            if silence >= self.silence_limit {
+                return Err(BoardError::Silent(silence));
             }
         }
     }

@@ -268,16 +268,19 @@ impl<P: Port> Serial<P> {
     ) -> Result<Response, BoardError> {
         let mut buffer = [0; MAXIMUM_LENGTH];
         let bytes = wire::encode(request, &mut buffer)?;
-        let start = self.port.now();
+        let mut silence = Duration::ZERO;
         loop {
-            let left = silence_limit.saturating_sub(self.port.now() - start);
+            let left = silence_limit.saturating_sub(silence);
+            let sent = self.port.now();
             self.port.write(bytes, left)?;
-            if let Some(response) = self.receive(patience.min(left), &is_wanted)? {
+            let limit = patience.min(left);
+            if let Some(response) = self.receive(limit, &is_wanted)? {
                 return Ok(response);
             }
-            let elapsed = self.port.now() - start;
-            if elapsed >= silence_limit {
-                return Err(self.silence(elapsed));
+            // A longer wait means that this process was stopped.
+            silence += (self.port.now() - sent).min(limit);
+            if silence >= silence_limit {
+                return Err(self.silence(silence));
             }
             self.line.repeated_requests += 1;
             patience = patience.mul_f32(PATIENCE_GROWTH);
@@ -392,5 +395,46 @@ impl<P: Port> ConnectedBoard for Serial<P> {
 
     fn line(&self) -> Option<LineHealth> {
         Some(self.line)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::cell::Cell;
+
+    use super::*;
+
+    /// A line whose host is stopped for three seconds while it first waits.
+    #[derive(Default)]
+    struct Stopped {
+        clock: Cell<Duration>,
+        reads: u32,
+    }
+
+    impl Port for Stopped {
+        fn read(&mut self, bytes: &mut [u8], limit: Duration) -> Result<usize, BoardError> {
+            self.reads += 1;
+            if self.reads == 1 {
+                self.clock.set(self.clock.get() + 3 * SILENCE_LIMIT);
+                return Ok(0);
+            }
+            self.clock.set(self.clock.get() + limit);
+            Ok(wire::encode(&Response::Stopped, bytes)?.len())
+        }
+
+        fn write(&mut self, _: &[u8], _: Duration) -> Result<(), BoardError> {
+            Ok(())
+        }
+
+        fn now(&self) -> Duration {
+            self.clock.get()
+        }
+    }
+
+    #[test]
+    fn the_time_for_which_the_host_is_stopped_is_no_silence_of_the_board() {
+        let mut serial = Serial::over(Stopped::default()).unwrap();
+        serial.stop().unwrap();
+        assert_eq!(serial.line.repeated_requests, 1);
     }
 }

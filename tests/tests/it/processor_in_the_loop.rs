@@ -8,6 +8,7 @@
 use std::fs::Permissions;
 use std::io::Write;
 use std::os::unix::fs::{PermissionsExt, symlink};
+use std::os::unix::process::CommandExt;
 use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
@@ -406,6 +407,36 @@ fn the_log_is_printed_by_defmt_print() {
         errors(&output).contains(&format!("log of {image}: ")),
         "{output:?}"
     );
+}
+
+/// As by Ctrl-Z and fg. The emulator is the first to be stopped and the last to continue, so that its bridge waits for it.
+#[test]
+fn the_time_for_which_a_run_is_stopped_is_no_silence_of_the_board() {
+    let bench = Bench::new("stopped-together");
+    let image = image().to_string_lossy();
+    let ticks = ["--set", "run.duration_s=10", "--silence-limit-s", "2"];
+    let native = bench.report(&[&["run"], &ticks[..], &QUIET].concat());
+    let qemu = ["run", "--host", "qemu", "--elf", &image];
+    let mut run = bench.command(&[&qemu[..], &ticks, &QUIET].concat());
+    let run = run.process_group(0).stdout(Stdio::piped()).spawn().unwrap();
+    let id = run.id().cast_signed();
+    let [plant, bridge] = ["plant", "bridge"].map(|child| child_of(id, child));
+    let emulator = child_of(bridge, "-machine");
+    let pause = || std::thread::sleep(Duration::from_millis(100));
+    pause();
+    signal(emulator, Signal::SIGSTOP);
+    pause();
+    signal(-id, Signal::SIGSTOP);
+    std::thread::sleep(Duration::from_secs(3));
+    for id in [id, plant, bridge] {
+        signal(id, Signal::SIGCONT);
+    }
+    pause();
+    signal(emulator, Signal::SIGCONT);
+    let output = run.wait_with_output().unwrap();
+    assert!(output.status.success(), "{output:?}");
+    let report: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(report["log_hash"], native["log_hash"]);
 }
 
 #[test]
