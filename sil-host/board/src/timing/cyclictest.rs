@@ -1,7 +1,12 @@
 //! `cyclictest` of rt-tests beside the controller: what this machine grants a program that only sleeps and
 //! reads the clock, at the same rate and at the same time.
 
-use std::process::{Child, Command, Stdio};
+use std::ffi::OsStr;
+use std::io::{self, BufRead, BufReader, Read};
+use std::process::{ChildStderr, Command, Stdio};
+use std::thread::{self, JoinHandle};
+
+use painleve_process::lifetime::{Guarded, Signal, end_with_parent};
 
 use super::{TickTimes, TimingReport, Unit};
 
@@ -25,10 +30,12 @@ pub enum CyclictestError {
     Empty,
 }
 
-/// A running `cyclictest`.
-#[derive(Debug)]
+/// A running `cyclictest`, which ends when this value is dropped.
 pub struct Cyclictest {
-    child: Child,
+    child: Guarded,
+    /// Reads its output while it runs: once the pipe is full, `cyclictest` overwrites what it has not written yet.
+    latencies_ns: JoinHandle<TickTimes>,
+    complaint: ChildStderr,
     tick_hz: u32,
 }
 
@@ -43,7 +50,17 @@ impl Cyclictest {
         ticks: u64,
         fifo_priority: Option<u8>,
     ) -> Result<Self, CyclictestError> {
-        let mut command = Command::new(PROGRAM);
+        Self::start_program(PROGRAM.as_ref(), tick_hz, ticks, fifo_priority)
+            .map_err(CyclictestError::Start)
+    }
+
+    fn start_program(
+        program: &OsStr,
+        tick_hz: u32,
+        ticks: u64,
+        fifo_priority: Option<u8>,
+    ) -> io::Result<Self> {
+        let mut command = Command::new(program);
         let interval_us = (1_000_000 / tick_hz.max(1)).max(1);
         command
             .args(["--threads=1", "--nsecs", "--verbose"])
@@ -55,30 +72,38 @@ impl Cyclictest {
                 .arg(format!("--priority={priority}")),
             None => command.arg("--policy=other"),
         };
-        let child = command
+        command
             .stdin(Stdio::null())
             .stdout(Stdio::piped())
-            .stderr(Stdio::piped())
-            .spawn()
-            .map_err(CyclictestError::Start)?;
-        Ok(Self { child, tick_hz })
+            .stderr(Stdio::piped());
+        let mut child = end_with_parent(&mut command, Signal::SIGTERM).spawn()?;
+        let pipes = child.stdout.take().zip(child.stderr.take());
+        // From now on it is ended if a thread is refused.
+        let child = Guarded::new(child);
+        let (output, complaint) = pipes.ok_or(io::ErrorKind::BrokenPipe)?;
+        Ok(Self {
+            child,
+            latencies_ns: thread::Builder::new()
+                .spawn(move || latencies_ns(BufReader::new(output)))?,
+            complaint,
+            tick_hz,
+        })
     }
 
     /// Waits until it has ended; returns its latencies as the report of a scenario of its own.
     ///
     /// # Errors
     /// [`CyclictestError`].
-    pub fn finish(self) -> Result<TimingReport, CyclictestError> {
+    pub fn finish(mut self) -> Result<TimingReport, CyclictestError> {
         let tick_hz = self.tick_hz;
-        let output = self
-            .child
-            .wait_with_output()
-            .map_err(CyclictestError::Start)?;
-        if !output.status.success() {
-            let text = String::from_utf8_lossy(&output.stderr).trim().to_owned();
+        let mut complaint = Vec::new();
+        let read = self.complaint.read_to_end(&mut complaint);
+        let status = read.and_then(|_| self.child.child().wait());
+        if !status.map_err(CyclictestError::Start)?.success() {
+            let text = String::from_utf8_lossy(&complaint).trim().to_owned();
             return Err(CyclictestError::Failed(text));
         }
-        let times = latencies_ns(&String::from_utf8_lossy(&output.stdout));
+        let times = self.latencies_ns.join().unwrap_or_default();
         if times.ticks() == 0 {
             return Err(CyclictestError::Empty);
         }
@@ -99,9 +124,9 @@ impl Cyclictest {
 }
 
 /// Returns the latencies in lines "thread: number: latency".
-fn latencies_ns(text: &str) -> TickTimes {
+fn latencies_ns(output: impl BufRead) -> TickTimes {
     let mut times = TickTimes::default();
-    for line in text.lines() {
+    for line in output.lines().map_while(Result::ok) {
         let mut fields = line.split(':').map(str::trim);
         let (Some(_), Some(number), Some(latency)) = (fields.next(), fields.next(), fields.next())
         else {
@@ -118,6 +143,9 @@ fn latencies_ns(text: &str) -> TickTimes {
 
 #[cfg(test)]
 mod tests {
+    use std::os::unix::fs::PermissionsExt;
+    use std::time::{Duration, Instant};
+
     use super::*;
 
     #[test]
@@ -127,8 +155,29 @@ mod tests {
                            0:       0:       37210\n\
                            0:       1:     2253100\n\
                     T: 0 (  321) P: 0 I:1000 C:    300 Min:     37 Act: 74 Avg: 486 Max: 22531\n";
-        let times = latencies_ns(text);
+        let times = latencies_ns(text.as_bytes());
         assert_eq!(times.histogram(), [(37_210, 1), (2_253_100, 1)]);
         assert!(times.worst().is_none());
+    }
+
+    #[test]
+    fn the_output_is_read_while_cyclictest_runs() {
+        let folder = tempfile::tempdir().unwrap();
+        let program = folder.path().join("cyclictest");
+        let all_written = folder.path().join("all-written");
+        let script = format!(
+            "#!/bin/sh\nseq -f '0:%.0f:70' 100000\n: > {}\nexec sleep 0.1\n",
+            all_written.display()
+        );
+        std::fs::write(&program, script).unwrap();
+        let executable = std::fs::Permissions::from_mode(0o755);
+        std::fs::set_permissions(&program, executable).unwrap();
+        let running = Cyclictest::start_program(program.as_ref(), 1000, 100_000, None).unwrap();
+        let start = Instant::now();
+        while !all_written.exists() {
+            assert!(start.elapsed() < Duration::from_secs(20), "it waits");
+            thread::sleep(Duration::from_millis(1));
+        }
+        assert_eq!(running.finish().unwrap().ticks, 100_000);
     }
 }
