@@ -68,6 +68,10 @@ fn bad_scenarios_are_refused_by_name_and_range() {
         ),
         (&["--set", "run.duration_s=-1"], &["run.duration_s = -1"]),
         (
+            &["--set", "run.duration_s=0.001", "--set", "run.tick_hz=250"],
+            &["run.duration_s = 0.001", "0.002 to"],
+        ),
+        (
             &["--set", "controller.torque_limit_nm=9"],
             &["controller.torque_limit_nm = 9", "0 to 5"],
         ),

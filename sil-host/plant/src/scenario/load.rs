@@ -162,6 +162,17 @@ mod tests {
     }
 
     #[test]
+    fn a_run_has_at_least_one_tick() {
+        let of_duration = |key: &str| load(&["run.tick_hz=250", key]);
+        assert_eq!(of_duration("run.duration_s=0.002").unwrap().run.ticks(), 1);
+        let text = of_duration("run.duration_s=0.0019")
+            .unwrap_err()
+            .to_string();
+        assert!(text.contains("run.duration_s = 0.0019"), "{text}");
+        assert!(text.ends_with("0.002 to 10000000"), "{text}");
+    }
+
+    #[test]
     fn targets_keep_their_decimals() {
         let target = |name| Scenario::load(name, &[]).unwrap().target_m();
         assert_eq!(target("hybrid-elbow-up"), Some(0.163));

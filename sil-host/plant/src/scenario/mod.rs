@@ -141,6 +141,16 @@ impl Scenario {
 
     /// Checks the limits that depend on several parts.
     fn relations(&self) -> Result<(), OutOfRange> {
+        let run = &self.run;
+        if run.ticks() == 0 {
+            let too_short = OutOfRange {
+                value: run.duration_s,
+                minimum: 0.5 / f64::from(run.tick_hz),
+                maximum: 1e7,
+                ..OutOfRange::default()
+            };
+            return Err(too_short.inside("duration_s").inside("run"));
+        }
         self.controller_configuration()
             .validate()
             .map_err(in_scenario)?;
