@@ -9,9 +9,8 @@ use painleve_board::timing::{Cyclictest, CyclictestError, Metronome, TimingRepor
 use painleve_board::{ConnectedBoard, Drivers, OnBoard, SILENCE_LIMIT, Serial};
 use painleve_chart::picture;
 use painleve_files::atomic_file;
-use painleve_plant::closed_loop::{ClosedLoop, LoopError, Monitor};
+use painleve_plant::closed_loop::ClosedLoop;
 use painleve_plant::controller_host::{ControllerHost, InProcess};
-use painleve_plant::sample::Sample;
 use painleve_plant::scenario::{Scenario, ScenarioError, built_in};
 use painleve_plant::simulation::Simulation;
 use painleve_process::interrupt::Interrupt;
@@ -180,7 +179,10 @@ fn drive<H: ControllerHost>(
     let simulation = Simulation::new(scenario).map_err(|source| out_of_range(scenario, source))?;
     let mut closed_loop = ClosedLoop::new(simulation, host);
     for _ in 0..scenario.run.ticks() {
-        closed_loop.tick(&mut UntilAsked(interrupt))?;
+        closed_loop.tick(&mut ())?;
+        if interrupt.is_requested() {
+            return Err(CommandError::Interrupted);
+        }
     }
     Ok(closed_loop.finish().1)
 }
@@ -189,25 +191,5 @@ fn out_of_range(scenario: &Scenario, source: painleve_shared::range::OutOfRange)
     ScenarioError::Range {
         origin: scenario.name.clone(),
         source,
-    }
-}
-
-/// Monitors only requests to end.
-struct UntilAsked<'a>(&'a Interrupt);
-
-impl Monitor for UntilAsked<'_> {
-    fn wants_samples(&self) -> bool {
-        false
-    }
-
-    fn sample(&mut self, _: &Sample) -> Result<(), LoopError> {
-        Ok(())
-    }
-
-    fn tick(&mut self) -> Result<(), LoopError> {
-        if self.0.is_requested() {
-            return Err(LoopError::Interrupted);
-        }
-        Ok(())
     }
 }

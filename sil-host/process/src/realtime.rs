@@ -6,16 +6,12 @@ use std::time::Duration;
 
 use crate::terminal::warn;
 use nix::errno::Errno;
+use nix::libc::{SCHED_FIFO, SYS_sched_setscheduler, c_int, syscall};
 use nix::sys::mman::{MlockAllFlags, mlockall};
 use nix::sys::prctl::set_timerslack;
 use nix::sys::resource::{RLIM_INFINITY, Resource, getrlimit};
 use nix::sys::time::TimeSpec;
 use nix::time::{ClockId, ClockNanosleepFlags, clock_gettime, clock_nanosleep};
-use thread_priority::unix::{
-    RealtimeThreadSchedulePolicy, ThreadSchedulePolicy, set_thread_priority_and_policy,
-    thread_native_id,
-};
-use thread_priority::{ThreadPriority, ThreadPriorityValue};
 
 /// Priority under `SCHED_FIFO`: above all ordinary threads, just below the interrupt threads (50)
 /// of a real-time kernel, on which the wake-ups depend.
@@ -127,17 +123,15 @@ pub fn request_realtime() -> RealtimeStatus {
     }
 }
 
+#[allow(unsafe_code)]
 fn request_fifo() -> Result<(), String> {
-    let priority = ThreadPriorityValue::try_from(FIFO_PRIORITY)?;
-    set_thread_priority_and_policy(
-        thread_native_id(),
-        ThreadPriority::Crossplatform(priority),
-        ThreadSchedulePolicy::Realtime(RealtimeThreadSchedulePolicy::Fifo),
-    )
-    .map_err(|error| match error {
-        thread_priority::Error::OS(code) => Errno::from_raw(code).desc().to_owned(),
-        other => other.to_string(),
-    })
+    let priority = c_int::from(FIFO_PRIORITY);
+    // The system call itself: musl's function of this name always fails.
+    // SAFETY: the system reads its `sched_param`, which is this one integer; 0 means the calling thread.
+    let result = unsafe { syscall(SYS_sched_setscheduler, 0, SCHED_FIFO, &raw const priority) };
+    Errno::result(result)
+        .map(|_| ())
+        .map_err(|error| error.desc().to_owned())
 }
 
 fn lock_memory() -> Result<(), String> {
