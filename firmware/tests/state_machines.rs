@@ -247,7 +247,8 @@ impl StateMachineTest for SupervisorTest {
     type Reference = SupervisorReference;
 
     fn init_test(model: &SupervisorModel) -> Self::SystemUnderTest {
-        Supervisor::new(model.limits.settings(), f32::from(TICK_HZ))
+        let limits = LapseLimits::default();
+        Supervisor::new(model.limits.settings(), limits, f32::from(TICK_HZ))
     }
 
     fn apply(mut supervisor: Supervisor, _: &SupervisorModel, event: Event) -> Supervisor {

@@ -23,7 +23,7 @@ use painleve_shared::counts::TorqueCounts;
 use painleve_shared::frame::{ActuatorFrame, DigitalInputs, SensorFrame, StatusFlags};
 use painleve_shared::range::OutOfRange;
 
-use self::arrival::{Arrival, Lapses, arrive};
+use self::arrival::{Arrival, arrive};
 use self::stages::{Stages, report};
 use crate::configuration::Configuration;
 use crate::law::{Law, LawSettings};
@@ -83,7 +83,6 @@ use crate::telemetry::Telemetry;
 pub struct Controller<L: Law = LawSettings> {
     last_answer: ActuatorFrame,
     stages: Stages<L>,
-    monitor: LapseMonitor,
     due: Due,
 }
 
@@ -109,7 +108,6 @@ impl<L: Law> Controller<L> {
         Ok(Self {
             last_answer: ActuatorFrame::default(),
             stages: Stages::new(configuration, arm),
-            monitor: LapseMonitor::new(configuration.settings.lapses),
             due: Due::Nothing,
         })
     }
@@ -172,11 +170,7 @@ impl<L: Law> Controller<L> {
     /// output at once.
     #[inline]
     pub fn note(&mut self, lapse: Lapse, times: u32) -> Option<ActuatorFrame> {
-        let mut lapses = Lapses {
-            monitor: &mut self.monitor,
-            supervisor: &mut self.stages.supervisor,
-        };
-        lapses.note(lapse, times).then(|| {
+        self.stages.supervisor.note(lapse, times).then(|| {
             self.stop(None);
             self.last_answer
         })
@@ -184,7 +178,7 @@ impl<L: Law> Controller<L> {
 
     /// Returns how often each kind of lapse has occurred.
     pub fn lapse_counts(&self) -> &LapseMonitor {
-        &self.monitor
+        self.stages.supervisor.lapses()
     }
 
     #[inline]
@@ -193,18 +187,12 @@ impl<L: Law> Controller<L> {
             self.catch_up();
         }
         let Stages {
-            ranges,
-            arrivals,
+            estimates,
             supervisor,
+            arrivals,
             ..
         } = &mut self.stages;
-        let lapses = Lapses {
-            monitor: &mut self.monitor,
-            supervisor,
-        };
-        let arrival = arrive(ranges, arrivals, lapses, frame);
-        let supervisor = &mut self.stages.supervisor;
-        match arrival {
+        match arrive(arrivals, supervisor, estimates, frame) {
             Arrival::After(elapsed_ticks) => {
                 let answer = &mut self.last_answer;
                 let followed = self.stages.answer(frame, elapsed_ticks, answer, telemetry);
@@ -214,17 +202,16 @@ impl<L: Law> Controller<L> {
                 };
             }
             // Without new readings, the last torque stays for a limited number of ticks.
-            Arrival::Stale if supervisor.drives() => {}
-            Arrival::Stale => self.stop(telemetry),
-            Arrival::OutOfRange => {
-                let enabled = frame.inputs.contains(DigitalInputs::ENABLE);
-                if !(supervisor.drives() && enabled) {
-                    if supervisor.drives() {
+            arrival => {
+                if arrival == Arrival::OutOfRange {
+                    self.due = Due::Preparation;
+                    if supervisor.drives() && !frame.inputs.contains(DigitalInputs::ENABLE) {
                         supervisor.disable();
                     }
+                }
+                if !supervisor.drives() {
                     self.stop(telemetry);
                 }
-                self.due = Due::Preparation;
             }
         }
         self.last_answer.tick = frame.tick;

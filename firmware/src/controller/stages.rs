@@ -5,7 +5,7 @@ use painleve_shared::frame::{ActuatorFrame, SensorFrame, StatusFlags};
 use painleve_shared::status::Fault;
 use painleve_shared::{Arm, Slip};
 
-use super::arrival::{ArrivalState, ReadingRanges};
+use super::arrival::ArrivalState;
 use crate::configuration::Configuration;
 use crate::demand::TorqueDemand;
 use crate::estimate::joints::{JointEstimatorSettings, Restart};
@@ -25,7 +25,8 @@ use crate::torque_output::TorqueOutput;
 #[derive(Clone, Debug)]
 #[repr(C)]
 pub struct Stages<L: Law> {
-    estimates: Estimators,
+    /// What is known of arm, contact and belt.
+    pub estimates: Estimators,
     command: LastCommand,
     demand: TorqueDemand<L>,
     /// Whether the arm is driven, and the latched fault.
@@ -37,8 +38,6 @@ pub struct Stages<L: Law> {
     /// What has arrived.
     pub arrivals: ArrivalState,
     torques: TorqueOutput,
-    /// Ranges of the readings.
-    pub ranges: ReadingRanges,
 }
 
 impl<L: Law> Stages<L> {
@@ -68,7 +67,11 @@ impl<L: Law> Stages<L> {
             estimates: Estimators::new(&estimates, arm),
             command: LastCommand::default(),
             demand: TorqueDemand::new(configuration, speed),
-            supervisor: Supervisor::new(settings.supervisor, configuration.tick_hz),
+            supervisor: Supervisor::new(
+                settings.supervisor,
+                settings.lapses,
+                configuration.tick_hz,
+            ),
             references: References::new(
                 EdgeGovernor::new(
                     &settings.governor,
@@ -83,7 +86,6 @@ impl<L: Law> Stages<L> {
             turn: Turn::default(),
             arrivals: ArrivalState::default(),
             torques: TorqueOutput::new(converters.torque, settings.torque_limit_nm),
-            ranges: ReadingRanges::of(converters),
         }
     }
 

@@ -39,7 +39,7 @@ settings! {
 }
 
 /// Largest number of ticks over which the joints are predicted: a fault is latched long before.
-const MOST_LOST_TICKS: u32 = 1000;
+pub const MOST_LOST_TICKS: u32 = 1000;
 
 /// Why the tracking loops have started from the readings of a tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -125,6 +125,13 @@ impl JointEstimator {
             predicted_ticks: 0,
             most_counts: [0; 2],
         }
+    }
+
+    /// Returns whether the encoders can give these readings.
+    #[inline]
+    pub fn can_read(&self, [reading_1, reading_2]: [EncoderCounts; 2]) -> bool {
+        let [scale_1, scale_2] = &self.scales;
+        scale_1.contains(reading_1) && scale_2.contains(reading_2)
     }
 
     /// Corrects the prediction with the readings of one tick.

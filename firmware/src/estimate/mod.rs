@@ -161,6 +161,15 @@ impl Estimators {
         self.decision.confidence()
     }
 
+    /// Returns whether the encoders, and whether the force cell, can give a frame's readings.
+    #[inline]
+    pub fn readable(&self, frame: &SensorFrame) -> (bool, bool) {
+        let force_cell = &self.force_cell;
+        let forces = force_cell.contains(frame.normal_force.0)
+            && force_cell.contains(frame.tangential_force.0);
+        (self.joints.can_read(frame.joints), forces)
+    }
+
     /// Corrects the predicted state of the arm with a frame's readings, `elapsed_ticks` after the previous ones, and
     /// decides about contact.
     ///

@@ -4,7 +4,16 @@
 //! than the limit is a fault, which the controller latches until a reset. So is a lapse that keeps coming back, for
 //! example at every other tick: it takes several good ticks to make up for one lapse.
 
+use painleve_shared::frame::DigitalInputs;
 pub use painleve_shared::lapse::{Lapse, LapseCounts, LapseLimits};
+
+/// Lapses that a board detects by itself, and reports by these inputs.
+pub const BOARD_LAPSES: [(DigitalInputs, Lapse); 4] = [
+    (DigitalInputs::ARMING_REFUSED, Lapse::ArmingRefused),
+    (DigitalInputs::STAGE_NOT_READY, Lapse::StageNotReady),
+    (DigitalInputs::GAP_AGAINST_FORCE, Lapse::GapAgainstForce),
+    (DigitalInputs::WINDING_HOT, Lapse::WindingHot),
+];
 
 /// Good ticks that make up for one lapse. With two, a kind that fails at more than a third of the ticks is a fault in
 /// the end, whatever its limit; with one, a kind that fails at every other tick never would be.

@@ -5,6 +5,8 @@ use painleve_shared::frame::DigitalInputs;
 use painleve_shared::status::{Fault, SupervisorState};
 use painleve_shared::{OutOfRange, check_setting, settings};
 
+use super::lapses::{Lapse, LapseLimits, LapseMonitor};
+
 settings! {
     /// Reaction to a loss of contact while tracking.
     #[derive(Copy, Eq)]
@@ -52,14 +54,16 @@ impl SupervisorSettings {
 pub struct Supervisor {
     state: SupervisorState,
     fault: Option<Fault>,
-    /// Ticks in the present state or, while armed, in contact.
+    /// Ticks in the present state.
     ticks: u32,
+    /// Ticks in contact while armed, without interruption.
     contact_ticks: u32,
     /// Lift-offs in a row.
     lift_offs: u32,
     inputs: DigitalInputs,
     settings: SupervisorSettings,
     tick_hz: f32,
+    lapses: LapseMonitor,
 }
 
 /// The supervisor's decision at one tick.
@@ -84,7 +88,7 @@ impl Phase {
 
 impl Supervisor {
     /// Makes a supervisor that is called `tick_hz` times a second.
-    pub fn new(settings: SupervisorSettings, tick_hz: f32) -> Self {
+    pub fn new(settings: SupervisorSettings, limits: LapseLimits, tick_hz: f32) -> Self {
         Self {
             state: SupervisorState::Idle,
             fault: None,
@@ -94,6 +98,7 @@ impl Supervisor {
             inputs: DigitalInputs(0),
             settings,
             tick_hz,
+            lapses: LapseMonitor::new(limits),
         }
     }
 
@@ -192,6 +197,34 @@ impl Supervisor {
         self.state.drives()
     }
 
+    /// Returns how often each kind of lapse has occurred.
+    pub fn lapses(&self) -> &LapseMonitor {
+        &self.lapses
+    }
+
+    /// Records how many times a lapse occurred, 0 for none. Returns whether this has just latched a
+    /// fault; the caller then takes the torque off.
+    #[inline]
+    pub fn note(&mut self, lapse: Lapse, times: u32) -> bool {
+        // Nearly all calls record no lapse: return early.
+        if times == 0 {
+            self.lapses.note_good(lapse);
+            false
+        } else {
+            self.note_bad(lapse, times)
+        }
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn note_bad(&mut self, lapse: Lapse, times: u32) -> bool {
+        let latches = self.lapses.note(lapse, times) && self.fault.is_none();
+        if latches {
+            self.latch(lapse.fault());
+        }
+        latches
+    }
+
     /// Latches a fault unless one is latched already.
     pub fn latch(&mut self, fault: Fault) {
         if self.fault.is_none() {
@@ -227,7 +260,8 @@ mod tests {
 
     impl Default for Tested {
         fn default() -> Self {
-            Self(Supervisor::new(SupervisorSettings::default(), 1000.0))
+            let (settings, limits) = (SupervisorSettings::default(), LapseLimits::default());
+            Self(Supervisor::new(settings, limits, 1000.0))
         }
     }
 
