@@ -72,6 +72,11 @@ fn irregular(
     let stale = ahead == 0 || ahead > u32::MAX / 2;
     supervisor.note(Lapse::StaleFrame, u32::from(stale));
     if stale {
+        // A sender that has started anew counts from another number: follow it once its frames have latched a fault, so
+        // that it can reset the fault.
+        if supervisor.fault().is_some() {
+            state.last_sequence = Some(frame.sequence);
+        }
         return Arrival::Stale;
     }
     state.last_sequence = Some(frame.sequence);

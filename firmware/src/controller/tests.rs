@@ -247,6 +247,24 @@ fn a_stale_frame_keeps_the_torque_and_many_are_a_fault() {
 }
 
 #[test]
+fn a_sender_that_starts_anew_resets_the_fault_and_arms() {
+    let mut controller = Controller::new(&configuration()).unwrap();
+    run(&mut controller, 1000..1020);
+    let answer = run(&mut controller, 0..20);
+    assert_eq!(answer.latched_fault(), Some(Fault::StaleFrame));
+    for (sequence, inputs, state) in [
+        (20, DigitalInputs::RESET, SupervisorState::Idle),
+        (21, DigitalInputs::ENABLE, SupervisorState::Armed),
+    ] {
+        let answer = controller.tick(&SensorFrame {
+            inputs,
+            ..frame(sequence)
+        });
+        assert_eq!(answer.supervisor_state(), Some(state));
+    }
+}
+
+#[test]
 fn torque_is_limited_and_counted() {
     let mut limited = configuration();
     // Less torque than holding the arm takes, so that pressing less does not help.
