@@ -9,6 +9,7 @@ use painleve_shared::status::{Fault, SupervisorState};
 
 use crate::configuration::Configuration;
 use crate::law::Law;
+use crate::supervise::lapses::{BOARD_LAPSES, Lapse, LapseMonitor};
 
 /// Time after which a torque that is not repeated expires, s.
 const LIFETIME_S: f32 = 0.05;
@@ -19,7 +20,8 @@ const FARTHEST: u32 = 32;
 /// A drive in open loop.
 #[derive(Clone, Debug)]
 pub struct OpenLoop {
-    encoders: [EncoderScale; 2],
+    /// Scale of both encoders, whose zeros do not matter here.
+    encoder: EncoderScale,
     /// Largest torque, counts.
     limit: i32,
     /// Ticks after which a torque expires.
@@ -29,22 +31,24 @@ pub struct OpenLoop {
     age: u32,
     /// Readings when the drive was armed; `None` while it is not.
     armed_at: Option<[EncoderCounts; 2]>,
-    fault: Option<Fault>,
+    lapses: LapseMonitor,
     last: ActuatorFrame,
 }
 
 impl OpenLoop {
-    /// Makes a drive that is not armed, with the configuration's torque limit.
+    /// Makes a drive that is not armed, with the configuration's limits of torque and lapses.
     pub fn new<L: Law>(configuration: &Configuration<L>) -> Self {
-        let torque = &configuration.converters.torque;
+        let (converters, settings) = (&configuration.converters, &configuration.settings);
+        let [encoder, _] = converters.encoders;
         Self {
-            encoders: configuration.converters.encoders,
-            limit: torque.counts(configuration.settings.torque_limit_nm).0,
-            lifetime: (LIFETIME_S * configuration.tick_hz) as u32,
+            encoder,
+            limit: converters.torque.counts(settings.torque_limit_nm).0,
+            // However slow the ticks are, a torque acts until the next one.
+            lifetime: ((LIFETIME_S * configuration.tick_hz) as u32).max(1),
             torques: [TorqueCounts(0); 2],
             age: 0,
             armed_at: None,
-            fault: None,
+            lapses: LapseMonitor::new(settings.lapses),
             last: ActuatorFrame::default(),
         }
     }
@@ -63,19 +67,16 @@ impl OpenLoop {
     #[cold]
     #[inline(never)]
     pub fn tick(&mut self, frame: &SensorFrame) -> &ActuatorFrame {
-        let is_enabled = frame.inputs.contains(DigitalInputs::ENABLE) && self.fault.is_none();
+        let is_enabled = frame.inputs.contains(DigitalInputs::ENABLE) && self.last.fault == 0;
+        let is_readable = frame.joints.iter().all(|it| self.encoder.contains(*it));
         match self.armed_at {
             _ if !is_enabled => self.release(),
             Some(start) if self.has_moved_far(start, frame.joints) => {
                 self.latch(Fault::MovedTooFar);
             }
-            // The controller, whose lapses would count this, does not run.
-            Some(_) if frame.inputs.contains(DigitalInputs::WINDING_HOT) => {
-                self.latch(Fault::WindingTooHot);
-            }
-            Some(_) => {}
+            Some(_) => self.note_lapses(frame.inputs, is_readable),
             // A missing reading shows no motion from it.
-            None if self.are_readable(frame.joints) => self.armed_at = Some(frame.joints),
+            None if is_readable => self.armed_at = Some(frame.joints),
             None => {}
         }
         self.age = self.age.saturating_add(1);
@@ -97,10 +98,26 @@ impl OpenLoop {
     #[cold]
     #[inline(never)]
     pub fn latch(&mut self, fault: Fault) -> ActuatorFrame {
-        self.fault = self.fault.or(Some(fault));
+        if self.last.fault == 0 {
+            self.last.fault = fault as u8;
+        }
         self.release();
         self.report();
         self.last
+    }
+
+    /// Latches the fault of a lapse that occurs too often, in place of the controller, which does not run. Forces are
+    /// not needed here.
+    fn note_lapses(&mut self, inputs: DigitalInputs, is_readable: bool) {
+        let mut note = |lapse: Lapse, occurs: bool| {
+            if self.lapses.note(lapse, u32::from(occurs)) {
+                self.latch(lapse.fault());
+            }
+        };
+        note(Lapse::EncoderOutOfRange, !is_readable);
+        for (input, lapse) in BOARD_LAPSES {
+            note(lapse, inputs.contains(input));
+        }
     }
 
     fn release(&mut self) {
@@ -108,30 +125,23 @@ impl OpenLoop {
         self.torques = [TorqueCounts(0); 2];
     }
 
-    fn are_readable(&self, readings: [EncoderCounts; 2]) -> bool {
-        let ([scale_1, scale_2], [reading_1, reading_2]) = (&self.encoders, readings);
-        scale_1.contains(reading_1) && scale_2.contains(reading_2)
-    }
-
     /// Returns whether a joint has turned too far; a missing reading counts as no motion.
     fn has_moved_far(&self, from: [EncoderCounts; 2], to: [EncoderCounts; 2]) -> bool {
-        let moved = |scale: &EncoderScale, from: EncoderCounts, to: EncoderCounts| {
-            let turned = scale.difference(from, to).unsigned_abs();
-            scale.contains(to) && turned > scale.modulus() / FARTHEST
-        };
-        let ([scale_1, scale_2], [from_1, from_2], [to_1, to_2]) = (&self.encoders, from, to);
-        moved(scale_1, from_1, to_1) || moved(scale_2, from_2, to_2)
+        let encoder = &self.encoder;
+        from.into_iter().zip(to).any(|(from, to)| {
+            let turned = encoder.difference(from, to).unsigned_abs();
+            encoder.contains(to) && turned > encoder.modulus() / FARTHEST
+        })
     }
 
     fn report(&mut self) {
-        let state = match (self.fault, self.armed_at) {
-            (Some(_), _) => SupervisorState::Fault,
-            (None, Some(_)) => SupervisorState::Armed,
-            (None, None) => SupervisorState::Idle,
+        let state = match self.armed_at {
+            _ if self.last.fault != 0 => SupervisorState::Fault,
+            Some(_) => SupervisorState::Armed,
+            None => SupervisorState::Idle,
         };
         self.last.torques = self.torques;
         self.last.state = state as u8;
-        self.last.fault = self.fault.map_or(0, |fault| fault as u8);
     }
 }
 
@@ -139,6 +149,7 @@ impl OpenLoop {
 mod tests {
     use super::*;
     use crate::law::LawSettings;
+    use crate::supervise::lapses::LapseLimits;
 
     const REQUEST: [TorqueCounts; 2] = [TorqueCounts(100), TorqueCounts(-2000)];
 
@@ -216,14 +227,48 @@ mod tests {
         assert_eq!(answer.latched_fault(), Some(Fault::MovedTooFar));
     }
 
-    #[test]
-    fn a_hot_winding_takes_the_torque_off() {
+    /// Returns the fault that is latched by ticks with this frame, and their number, while the host repeats its torques.
+    fn latched_by(frame: &SensorFrame) -> Option<(Fault, u32)> {
         let mut open_loop = open_loop();
+        open_loop.tick(&self::frame(0, 100, DigitalInputs::ENABLE));
+        (1..100).find_map(|ticks| {
+            open_loop.request(REQUEST);
+            let answer = open_loop.tick(frame);
+            let fault = answer.latched_fault();
+            assert_eq!(answer.torques == [TorqueCounts(0); 2], fault.is_some());
+            Some((fault?, ticks))
+        })
+    }
+
+    #[test]
+    fn what_a_board_reports_takes_the_torque_off_as_with_a_law() {
+        for (input, lapse) in BOARD_LAPSES {
+            let ticks = LapseLimits::default().of(lapse) + 1;
+            let bad = frame(1, 100, DigitalInputs::ENABLE | input);
+            assert_eq!(latched_by(&bad), Some((lapse.fault(), ticks)));
+        }
+    }
+
+    #[test]
+    fn an_encoder_that_stays_silent_takes_the_torque_off() {
+        let silent = frame(1, u32::MAX, DigitalInputs::ENABLE);
+        assert_eq!(latched_by(&silent), Some((Fault::EncoderOutOfRange, 2)));
+        assert_eq!(latched_by(&frame(1, 100, DigitalInputs::ENABLE)), None);
+    }
+
+    #[test]
+    fn a_torque_acts_at_the_lowest_rate() {
+        let mut configuration = Configuration::<LawSettings> {
+            tick_hz: 10.0,
+            ..Default::default()
+        };
+        configuration.settings.torque_limit_nm = 1.0;
+        let mut open_loop = OpenLoop::new(&configuration);
         open_loop.tick(&frame(0, 100, DigitalInputs::ENABLE));
         open_loop.request(REQUEST);
-        let inputs = DigitalInputs::ENABLE | DigitalInputs::WINDING_HOT;
-        let answer = open_loop.tick(&frame(1, 100, inputs));
-        assert_eq!(answer.latched_fault(), Some(Fault::WindingTooHot));
+        let answer = *open_loop.tick(&frame(1, 100, DigitalInputs::ENABLE));
+        assert_ne!(answer.torques, [TorqueCounts(0); 2]);
+        let answer = open_loop.tick(&frame(2, 100, DigitalInputs::ENABLE));
         assert_eq!(answer.torques, [TorqueCounts(0); 2]);
     }
 

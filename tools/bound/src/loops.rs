@@ -95,6 +95,11 @@ impl Limits {
                 wait(chip, longest_setup_ns, 0.0),
                 "the longer set-up time of the two buses, which are started together",
             ),
+            declare(
+                "OpenLoop::note_lapses",
+                Limit::Times(4),
+                "four lapses that a board reports",
+            ),
             declare("plausibility::", Limit::Times(2), "two joints"),
             declare("EncoderCorrector::at", Limit::Times(2), "two joints"),
             declare(
