@@ -12,8 +12,6 @@ use crate::supervise::supervisor::Supervisor;
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Telemetry {
-    /// Tick of the last sensor frame.
-    pub tick: u32,
     /// Supervisor state.
     pub state: SupervisorState,
     /// Latched fault.
@@ -63,7 +61,6 @@ impl Telemetry {
     #[inline]
     pub(crate) fn record(
         &mut self,
-        tick: u32,
         estimates: &Estimators,
         target: &Target,
         command: &LastCommand,
@@ -71,7 +68,6 @@ impl Telemetry {
     ) {
         let (model, contact) = (&estimates.model, &estimates.contact);
         *self = Self {
-            tick,
             state: supervisor.state(),
             fault: supervisor.fault(),
             theta_rad: model.theta_rad,

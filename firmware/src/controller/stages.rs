@@ -137,8 +137,7 @@ impl<L: Law> Stages<L> {
         answer.flags.set(StatusFlags::RECOVERING, recovers);
         report(answer, &self.supervisor);
         if let Some(telemetry) = telemetry {
-            let tick = frame.tick;
-            telemetry.record(tick, estimates, &target, command, &self.supervisor);
+            telemetry.record(estimates, &target, command, &self.supervisor);
         }
         followed
     }

@@ -81,10 +81,7 @@ fn what_is_learnt_does_not_depend_on_the_numbers_of_the_ticks() {
             };
             controller.tick_with_telemetry(&frame, &mut telemetry);
         }
-        Telemetry {
-            tick: 0,
-            ..telemetry
-        }
+        telemetry
     };
     let usual = after(|sequence| sequence);
     let [lower_m, upper_m] = usual.edges_m;
