@@ -1,12 +1,10 @@
 //! The torque that a tick demands: from the law while the tip touches, from the recovery while a tip
 //! that left the belt is returned to it.
 
-use painleve_shared::Posture;
-
 use crate::configuration::Configuration;
 use crate::estimate::Estimators;
 use crate::law::{Law, LawInput, LawOutput};
-use crate::recover::{RecoverySettings, RecoveryState};
+use crate::recover::{Flight, RecoverySettings};
 use crate::refer::Target;
 use crate::supervise::supervisor::Phase;
 
@@ -15,7 +13,8 @@ use crate::supervise::supervisor::Phase;
 #[repr(C)]
 pub struct TorqueDemand<L: Law> {
     law_state: L::State,
-    recovery_state: RecoveryState,
+    /// The recovery in progress.
+    pub flight: Option<Flight>,
     law: L,
     recovery: RecoverySettings,
     tick_s: f32,
@@ -29,22 +28,12 @@ impl<L: Law> TorqueDemand<L> {
         let law = settings.law.at_speed(speed);
         Self {
             law_state: law.initial_state(),
-            recovery_state: RecoveryState::default(),
+            flight: None,
             law,
             recovery: settings.recovery,
             tick_s: configuration.tick_s(),
             torque_limit_nm: settings.torque_limit_nm,
         }
-    }
-
-    /// Posture in which the tip is to land; `None` while no recovery is in progress.
-    pub fn landing_posture(&self) -> Option<Posture> {
-        self.recovery_state.posture()
-    }
-
-    /// Cancels a recovery in progress.
-    pub fn cancel_recovery(&mut self) {
-        self.recovery_state = RecoveryState::default();
     }
 
     /// Whether there is a law: without one the drive never arms.
@@ -70,10 +59,10 @@ impl<L: Law> TorqueDemand<L> {
         } = estimates;
         if target.recovering {
             let (edges_m, tick_s) = (target.fresh_edges_m, self.tick_s);
-            let recovery = &mut self.recovery_state;
-            return self.recovery.tick(recovery, arm, model, edges_m, tick_s);
+            let flight = &mut self.flight;
+            return self.recovery.tick(flight, arm, model, edges_m, tick_s);
         }
-        self.recovery_state.touch(self.tick_s);
+        self.flight.take_if(|flight| flight.touch(self.tick_s));
         let starts = phase.arms || contact.lands;
         let input = LawInput {
             arm,

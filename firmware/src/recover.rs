@@ -16,13 +16,13 @@ use crate::refer::governor::USABLE_REACH;
 /// Height above the belt at which the tip moves along it, m.
 const CLEARANCE_M: f32 = 1e-3;
 /// Distance from the landing point within which the tip is lowered, m.
-const OVER_LANDING_PLACE_M: f32 = 2e-3;
+const OVER_LANDING_PLACE_M: f32 = 2.0 * CLEARANCE_M;
 /// A contact that lasts this long is not a bounce, s.
 const LANDED_S: f32 = 0.05;
 /// Speed at which the tip is raised to its clearance, m/s.
 const RAISING_M_S: f32 = 0.1;
-/// Rate at which the height above the belt decays on the way down, 1/s.
-const DESCENT_PER_S: f32 = 15.0;
+/// Rate at which the height above the belt decays on the way down, as a part of the bandwidth of the motion.
+const DESCENT: f32 = 0.25;
 /// Depth below the belt to which the tip is sent until contact is detected, m.
 const DEEPEST_M: f32 = 0.03;
 /// Factor on the landing speed below the assumed belt: a tip that gets there shows that the links are
@@ -48,45 +48,32 @@ settings! {
     }
 }
 
-/// State of a recovery; idle while the tip touches.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct RecoveryState {
-    /// Landing point (m) and desired height (m), once the tip is in the air.
-    flight: Option<Flight>,
-}
-
-impl RecoveryState {
-    /// Posture in which the tip is to land; `None` while no recovery is in progress.
-    pub fn posture(&self) -> Option<Posture> {
-        self.flight.map(|flight| flight.posture)
-    }
-
-    /// Records a tick of `tick_s` (s) in contact. A contact that lasts ends the recovery; a tip that
-    /// bounces off earlier continues its descent.
-    pub fn touch(&mut self, tick_s: f32) {
-        let Some(flight) = &mut self.flight else {
-            return;
-        };
-        flight.path_rad = None;
-        flight.touched_s += tick_s;
-        if flight.touched_s > LANDED_S {
-            self.flight = None;
-        }
-    }
-}
-
+/// State of a recovery, from where the tip leaves the belt until it has landed.
 #[derive(Clone, Copy, Debug)]
-struct Flight {
+pub struct Flight {
+    /// Landing point, m.
     landing_m: f32,
+    /// Height of the path above the belt, m.
     height_m: f32,
     /// Whether the tip has been above its landing point. It then descends there, even if the first
     /// touch drags it along.
     lands: bool,
-    posture: Posture,
+    /// Posture in which the tip is to land.
+    pub posture: Posture,
     /// Link angles of the path at the previous tick, rad.
     path_rad: Option<LinkMotion<f32>>,
     /// Duration of the present contact, s.
     touched_s: f32,
+}
+
+impl Flight {
+    /// Records a tick of `tick_s` (s) in contact. Returns whether the tip has landed: a tip that bounces off earlier
+    /// continues its descent.
+    pub fn touch(&mut self, tick_s: f32) -> bool {
+        self.path_rad = None;
+        self.touched_s += tick_s;
+        self.touched_s > LANDED_S
+    }
 }
 
 impl RecoverySettings {
@@ -96,13 +83,13 @@ impl RecoverySettings {
     #[inline(never)]
     pub fn tick(
         &self,
-        state: &mut RecoveryState,
+        flight: &mut Option<Flight>,
         arm: &Arm<f32>,
         model: &Model,
         edges_m: Option<(f32, f32)>,
         tick_s: f32,
     ) -> LawOutput {
-        let mut flight = state.flight.unwrap_or(Flight {
+        let flight = flight.get_or_insert(Flight {
             landing_m: model.tip_m.x,
             height_m: model.gap_m.at_least(0.0),
             lands: false,
@@ -125,25 +112,24 @@ impl RecoverySettings {
             away.abs() < OVER_LANDING_PLACE_M || (flight.lands && admissible)
         });
         // Descend faster at greater height, and at landing speed close to the belt.
-        let down = if flight.height_m < 0.0 {
+        let down_m_s = if flight.height_m < 0.0 {
             SEARCHING * self.landing_speed_m_s
         } else {
-            self.landing_speed_m_s + DESCENT_PER_S * flight.height_m
+            self.landing_speed_m_s + DESCENT * self.bandwidth_rad_s * flight.height_m
         };
-        let vertical_speed = if !flight.lands {
-            let rise = (CLEARANCE_M - flight.height_m) / tick_s;
-            rise.limited(-down, RAISING_M_S)
+        let lowest_m = flight.height_m - down_m_s * tick_s;
+        flight.height_m = if flight.lands {
+            lowest_m.at_least(-DEEPEST_M)
         } else {
-            -down
+            CLEARANCE_M.limited(lowest_m, flight.height_m + RAISING_M_S * tick_s)
         };
-        flight.height_m = (flight.height_m + vertical_speed * tick_s).at_least(-DEEPEST_M);
         let wanted_m = Vector2::new(flight.landing_m, flight.height_m - arm.height_m());
         // A path below the belt ends at the arm's reach, most of all once the links have been found shorter. Further
         // inwards it gets deeper and presses.
         let distance_m = wanted_m.norm_squared().square_root();
         let excess = (distance_m / (USABLE_REACH * arm.reach_m())).at_least(1.0);
         if excess > 1.0 {
-            flight.landing_m *= 1.0 - (tick_s * INWARDS_PER_S).at_most(1.0);
+            flight.landing_m *= 1.0 - tick_s * INWARDS_PER_S;
         }
         let path_rad = arm
             .link_angles_rad(&(wanted_m / excess), flight.posture)
@@ -151,14 +137,12 @@ impl RecoverySettings {
             .unwrap_or(model.theta_rad);
         let path_rate_rad_s = (path_rad - flight.path_rad.unwrap_or(path_rad)) / tick_s;
         flight.path_rad = Some(path_rad);
-        state.flight = Some(flight);
 
         let bandwidth = self.bandwidth_rad_s;
         let wanted = (path_rad - model.theta_rad) * (bandwidth * bandwidth)
             + (path_rate_rad_s - model.theta_dot_rad_s) * (2.0 * bandwidth);
         let size = wanted.vector().norm_squared().square_root();
-        let scale =
-            (self.acceleration_rad_s2 / size.at_least(self.acceleration_rad_s2)).at_most(1.0);
+        let scale = self.acceleration_rad_s2 / size.at_least(self.acceleration_rad_s2);
         LawOutput {
             torque_nm: model.inverse_dynamics_in_air_nm(&(wanted * scale)),
             contact_force_n: Vector2::zeros(),
@@ -185,14 +169,14 @@ mod tests {
             &GeneralisedTorque::zeros(),
         );
         let recovery = RecoverySettings::default();
-        let mut state = RecoveryState::default();
+        let mut state = None;
         for _ in 0..10 {
             recovery.tick(&mut state, &arm, &model, None, 1e-3);
-            (0..40).for_each(|_| state.touch(1e-3));
-            assert_eq!(state.posture(), Some(Posture::ElbowDown));
+            let flight: &mut Flight = state.as_mut().unwrap();
+            assert!((0..40).all(|_| !flight.touch(1e-3)));
+            assert_eq!(flight.posture, Posture::ElbowDown);
         }
-        (0..11).for_each(|_| state.touch(1e-3));
-        assert_eq!(state.posture(), None);
+        assert!((0..11).any(|_| state.as_mut().unwrap().touch(1e-3)));
     }
 
     /// Returns the acceleration (m/s²) with which the recovery presses the tip down after `ticks` in which the belt
@@ -209,16 +193,14 @@ mod tests {
         let torque = GeneralisedTorque::zeros();
         let model = Model::new(&arm, theta, LinkMotion::zeros(), &torque);
         let recovery = RecoverySettings::default();
-        let mut state = RecoveryState {
-            flight: Some(Flight {
-                landing_m,
-                height_m: gap_m,
-                lands: gap_m <= 0.0,
-                posture,
-                path_rad: None,
-                touched_s: 0.0,
-            }),
-        };
+        let mut state = Some(Flight {
+            landing_m,
+            height_m: gap_m,
+            lands: gap_m <= 0.0,
+            posture,
+            path_rad: None,
+            touched_s: 0.0,
+        });
         let edges = Some((-0.15, 0.15));
         let torque = (0..ticks)
             .map(|_| {
@@ -230,7 +212,7 @@ mod tests {
             .unwrap();
         let acceleration = model.free_acceleration_rad_s2(&torque);
         let down = -(model.jacobian * acceleration.vector()).y;
-        (down, state.flight.unwrap().landing_m)
+        (down, state.unwrap().landing_m)
     }
 
     #[test]
@@ -264,7 +246,7 @@ mod tests {
             let mut theta = arm.link_angles_rad(&at, posture).unwrap();
             let mut theta_dot = LinkMotion::new(w1, w2);
             let recovery = RecoverySettings::default();
-            let mut state = RecoveryState::default();
+            let mut state = None;
             let edges = (-0.18, 0.155);
             let landing = (0..1000).find_map(|_| {
                 let model = Model::new(&arm, theta, theta_dot, &GeneralisedTorque::zeros());
@@ -275,7 +257,7 @@ mod tests {
                     theta += theta_dot * 1e-4;
                 }
                 let model = Model::new(&arm, theta, theta_dot, &GeneralisedTorque::zeros());
-                let down = model.gap_m < 0.0 && state.flight.is_some_and(|flight| flight.lands);
+                let down = model.gap_m < 0.0 && state.is_some_and(|flight: Flight| flight.lands);
                 down.then_some(model)
             });
             let model = landing.unwrap();

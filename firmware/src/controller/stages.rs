@@ -110,7 +110,7 @@ impl<L: Law> Stages<L> {
         let phase = self
             .supervisor
             .tick(frame.inputs, contact.touches, self.demand.is_on());
-        let landing = self.demand.landing_posture();
+        let landing = self.demand.flight.map(|flight| flight.posture);
         let target = self.references.tick(&self.estimates, &phase, landing);
         self.observed.elapsed_ticks = elapsed_ticks;
         if phase.drives() {
@@ -189,7 +189,7 @@ impl<L: Law> Stages<L> {
     /// Takes the torque off and cancels a recovery in progress.
     pub fn release(&mut self) {
         self.command = LastCommand::default();
-        self.demand.cancel_recovery();
+        self.demand.flight = None;
     }
 }
 
