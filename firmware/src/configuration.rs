@@ -22,10 +22,18 @@ use crate::estimate::joints::JointEstimatorSettings;
 use crate::estimate::response::ResponseSettings;
 use crate::law::{Law, LawSettings};
 use crate::recover::RecoverySettings;
-use crate::refer::governor::{GovernorSettings, JointErrors};
+use crate::refer::governor::GovernorSettings;
 use crate::refer::reference::Program;
 use crate::supervise::lapses::LapseLimits;
 use crate::supervise::supervisor::SupervisorSettings;
+
+/// Standard deviation of the tip's place for each count of an encoder by which rounding moves it. With a third of it, 44
+/// instead of 37 of 9,000 runs on rigid contact failed.
+const ROUNDING: f32 = 1.5;
+/// The same for each N·m of the joints' known friction, m/(N·m).
+const FRICTION_M_NM: f32 = 0.03;
+/// Control period for which the distance from the edge is set, s.
+const PERIOD_S: f32 = 1e-3;
 
 settings! {
     /// Scalings of the converters, as configured in the controller.
@@ -150,16 +158,20 @@ impl<L: Law> Configuration<L> {
         1.0 / self.tick_hz
     }
 
-    /// Returns what makes the joints' motion uncertain.
-    pub fn joint_errors(&self) -> JointErrors {
-        let [one, two] = self.converters.encoders;
-        let count_rad = one.rad_per_count::<f32>().at_least(two.rad_per_count());
+    /// Returns the distance that the governor keeps from the point where p/Q22 has its least value, m: what a disturbance
+    /// moves the tip before the controller reacts, and what makes the joints' motion uncertain.
+    pub fn kept_distance_m(&self) -> f32 {
+        let square = |value: f32| value * value;
+        let governor = &self.settings.governor;
+        let [encoder, _] = self.converters.encoders;
+        let count_m = self.arm.height_m * encoder.rad_per_count::<f32>();
         let [friction_1_nm, friction_2_nm] = self.arm.coulomb_friction_nm;
-        JointErrors {
-            count_m: self.arm.height_m * count_rad,
-            friction_nm: friction_1_nm.at_least(friction_2_nm),
-            tip_deviation_m: self.settings.estimator.tip_deviation_m,
-        }
+        let variance_m2 = square(ROUNDING * count_m)
+            + square(FRICTION_M_NM * friction_1_nm.at_least(friction_2_nm))
+            + square(self.settings.estimator.tip_deviation_m);
+        let distance_m2 = square(governor.distance_m * square(self.tick_s() / PERIOD_S))
+            + square(governor.deviations) * variance_m2;
+        distance_m2.square_root()
     }
 
     /// Returns the speed of tracking loops and law on this arm, at most 1, as a factor on what their settings say.

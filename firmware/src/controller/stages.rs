@@ -45,7 +45,6 @@ impl<L: Law> Stages<L> {
     pub fn new(configuration: &Configuration<L>, arm: Arm<f32>) -> Self {
         let (converters, settings) = (&configuration.converters, &configuration.settings);
         let speed = configuration.loop_speed(&arm);
-        let joint_errors = configuration.joint_errors();
         let estimates = EstimateSettings {
             tick_hz: configuration.tick_hz,
             encoders: converters.encoders,
@@ -76,7 +75,7 @@ impl<L: Law> Stages<L> {
                 EdgeGovernor::new(
                     &settings.governor,
                     configuration.tick_s(),
-                    &joint_errors,
+                    configuration.kept_distance_m(),
                     arm.reach_on_belt_m(),
                 ),
                 ReferenceGenerator::new(&settings.reference, configuration.tick_hz),

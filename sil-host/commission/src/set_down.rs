@@ -67,14 +67,13 @@ impl SetDown {
             })
         };
         let settings = &configuration.settings.governor;
-        let (tick_s, joints) = (configuration.tick_s(), configuration.joint_errors());
-        let away_m = settings.kept_distance_m(tick_s, &joints);
+        let (tick_s, away_m) = (configuration.tick_s(), configuration.kept_distance_m());
         let least_p = |place_m: f32| p_per_kg(place_m - away_m).min(p_per_kg(place_m + away_m));
         let places = (-PLACES..=PLACES).map(place_m);
         let best_m = places
             .max_by(|one, other| least_p(*one).total_cmp(&least_p(*other)))
             .unwrap_or_default();
-        let mut governor = EdgeGovernor::new(settings, tick_s, &joints, reach_m);
+        let mut governor = EdgeGovernor::new(settings, tick_s, away_m, reach_m);
         let found = (0..MOST_CALLS).find_map(|_| {
             governor.search(&arm, posture, best_m, &friction, 0.0);
             governor.fresh_edges_m()

@@ -4,7 +4,6 @@ use std::time::Duration;
 
 use comfy_table::CellAlignment;
 use hdrhistogram::Histogram;
-use painleve_firmware::refer::governor::JointErrors;
 use painleve_plant::closed_loop::LoopResult;
 use painleve_plant::scenario::Scenario;
 use painleve_process::terminal;
@@ -318,16 +317,9 @@ impl RunReport {
 /// Returns by how much the governor's distance is larger because the arm is not known exactly, m.
 fn distance_for_knowledge_m(scenario: &Scenario) -> f64 {
     let configuration = scenario.controller_configuration();
-    let distance_m = |joints: &JointErrors| {
-        let governor = &configuration.settings.governor;
-        f64::from(governor.kept_distance_m(configuration.tick_s(), joints))
-    };
-    let joints = configuration.joint_errors();
-    let known = JointErrors {
-        tip_deviation_m: 0.0,
-        ..joints
-    };
-    distance_m(&joints) - distance_m(&known)
+    let mut known = configuration.clone();
+    known.settings.estimator.tip_deviation_m = 0.0;
+    f64::from(configuration.kept_distance_m()) - f64::from(known.kept_distance_m())
 }
 
 fn microseconds(percentiles: &DurationPercentiles) -> String {

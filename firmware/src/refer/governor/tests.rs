@@ -1,6 +1,7 @@
 //! Tests of the edges against Table II of the paper, and of the governed reference.
 
 use super::*;
+use crate::configuration::Configuration;
 use painleve_shared::{ArmParameters, Pose, Slip};
 use proptest::prelude::*;
 
@@ -27,11 +28,26 @@ fn governor() -> EdgeGovernor {
         distance_m: 0.0,
         ..Default::default()
     };
-    with(&settings, TICK_S, &JointErrors::default())
+    with(&configuration(&settings))
 }
 
-fn with(settings: &GovernorSettings, tick_s: f32, joints: &JointErrors) -> EdgeGovernor {
-    EdgeGovernor::new(settings, tick_s, joints, arm().reach_on_belt_m())
+/// Returns a configuration of an arm that is known exactly.
+fn configuration(governor: &GovernorSettings) -> Configuration {
+    let mut configuration = Configuration::default();
+    configuration.settings.governor = *governor;
+    for encoder in &mut configuration.converters.encoders {
+        encoder.bits = 24;
+    }
+    configuration
+}
+
+fn with(configuration: &Configuration) -> EdgeGovernor {
+    EdgeGovernor::new(
+        &configuration.settings.governor,
+        configuration.tick_s(),
+        configuration.kept_distance_m(),
+        arm().reach_on_belt_m(),
+    )
 }
 
 fn searched(tip_t_m: f32, posture: Posture, friction: &FrictionEstimate) -> EdgeGovernor {
@@ -53,8 +69,8 @@ fn the_edges_are_those_of_table_ii() {
 }
 
 /// Returns the distance, m, from the upper edge with the friction 0.6 to where p is zero, 0.16471 m.
-fn distance_m(settings: &GovernorSettings, joints: &JointErrors, tick_s: f32, landing: f32) -> f32 {
-    let mut governor = with(settings, tick_s, joints);
+fn distance_m(configuration: &Configuration, landing: f32) -> f32 {
+    let mut governor = with(configuration);
     let friction = known(0.6, Slip::Positive);
     for _ in 0..300 {
         let posture = Posture::ElbowDown;
@@ -65,19 +81,20 @@ fn distance_m(settings: &GovernorSettings, joints: &JointErrors, tick_s: f32, la
 
 #[test]
 fn what_moves_the_tip_adds_to_the_distance_in_squares() {
-    let joints = JointErrors {
-        count_m: 1e-3,
-        friction_nm: 0.05,
-        tip_deviation_m: 2e-3,
-    };
-    let settings = GovernorSettings {
+    let mut configuration = configuration(&GovernorSettings {
         p_ratio: 0.0,
         ..Default::default()
-    };
-    let distance = distance_m(&settings, &joints, TICK_S, 0.0);
-    // 0.5, 3, 3 and 4 mm.
-    assert!((distance - 5.85e-3).abs() < 3e-5, "{distance}");
-    let more = distance_m(&GovernorSettings::default(), &joints, TICK_S, 0.0);
+    });
+    for encoder in &mut configuration.converters.encoders {
+        encoder.bits = 11;
+    }
+    configuration.arm.coulomb_friction_nm = [0.05, 0.02];
+    configuration.settings.estimator.tip_deviation_m = 2e-3;
+    let distance = distance_m(&configuration, 0.0);
+    // 0.5, 3.47, 3 and 4 mm.
+    assert!((distance - 6.11e-3).abs() < 3e-5, "{distance}");
+    configuration.settings.governor = GovernorSettings::default();
+    let more = distance_m(&configuration, 0.0);
     assert!(more > distance + 0.5e-3, "{more}");
 }
 
@@ -89,7 +106,7 @@ fn the_stretch_ends_where_p_has_its_least_value_in_kilograms() {
         distance_m: 0.0,
         ..Default::default()
     };
-    let back_m = distance_m(&settings, &JointErrors::default(), TICK_S, 0.0);
+    let back_m = distance_m(&configuration(&settings), 0.0);
     let arm = Arm::<f32>::new(ArmParameters::default()).unwrap();
     let theta = arm
         .link_angles_on_belt_rad(0.164_71 - back_m, Posture::ElbowDown)
@@ -100,8 +117,8 @@ fn the_stretch_ends_where_p_has_its_least_value_in_kilograms() {
 
 #[test]
 fn a_tip_that_may_land_asks_for_more() {
-    let (settings, joints) = (GovernorSettings::default(), JointErrors::default());
-    let of = |landing| distance_m(&settings, &joints, TICK_S, landing);
+    let configuration = configuration(&GovernorSettings::default());
+    let of = |landing| distance_m(&configuration, landing);
     assert_eq!(of(0.05), of(0.0));
     assert!(of(0.3) > 2.0 * of(0.0));
 }
@@ -113,7 +130,11 @@ fn the_distance_grows_with_the_square_of_the_period() {
             p_ratio: 0.0,
             ..Default::default()
         };
-        let distance = distance_m(&settings, &JointErrors::default(), 1.0 / tick_hz, 0.0);
+        let configuration = Configuration {
+            tick_hz,
+            ..configuration(&settings)
+        };
+        let distance = distance_m(&configuration, 0.0);
         assert!((distance - expected_m).abs() < 3e-5, "{distance}");
     }
 }
@@ -132,7 +153,7 @@ fn without_an_admissible_place_nearby_the_tip_is_led_to_the_best_one_and_not_acr
         p_per_kg: 6.0,
         ..Default::default()
     };
-    let mut governor = with(&settings, TICK_S, &JointErrors::default());
+    let mut governor = with(&configuration(&settings));
     let friction = known(0.79, Slip::Negative);
     let mut tip_t_m = 0.03;
     for _ in 0..3000 {
@@ -214,12 +235,13 @@ proptest! {
 
 #[test]
 fn a_moving_reference_is_caught_without_a_step_at_any_rate() {
-    for tick_s in [1e-3, 1e-2] {
-        let mut governor = with(
-            &GovernorSettings::default(),
-            tick_s,
-            &JointErrors::default(),
-        );
+    for tick_hz in [1e3, 1e2] {
+        let configuration = Configuration {
+            tick_hz,
+            ..configuration(&GovernorSettings::default())
+        };
+        let tick_s = configuration.tick_s();
+        let mut governor = with(&configuration);
         governor.restart(-0.02);
         let mut last = governor.govern(&TipReference::at_rest(-0.02));
         let wanted = ramp(0.0, 0.25, 0.15);
