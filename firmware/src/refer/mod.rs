@@ -125,7 +125,12 @@ impl References {
             requested_m: wanted.position_m,
             posture: self.posture,
             edges_m: self.governor.edges_m(),
-            fresh_edges_m: self.governor.fresh_edges_m(),
+            fresh_edges_m: if recovering {
+                self.governor
+                    .fresh_edges_m(self.posture, self.asked_p_ratio)
+            } else {
+                None
+            },
             at_edge: drives && self.governor.is_at_edge(),
             recovering,
         }

@@ -21,8 +21,6 @@ pub use self::settings::GovernorSettings;
 use crate::estimate::friction::FrictionEstimate;
 use crate::refer::reference::TipReference;
 
-/// Number of points from one end of the reach to the other in the outward search.
-const STEPS_OVER_REACH: f32 = 32.0;
 /// Fraction of the reach in use: beyond it the arm is almost straight.
 pub const USABLE_REACH: f32 = 0.995;
 
@@ -40,13 +38,10 @@ const APPROACH_PER_S: f32 = 20.0;
 #[repr(C)]
 pub struct EdgeGovernor {
     /// Edges of the admissible stretch around the tip, m.
-    lower_m: f32,
-    upper_m: f32,
-    search: Option<Search>,
-    /// Posture for which the present search looks.
-    posture: Posture,
-    /// Least ratio p/Q22 that it requires beyond the setting.
-    asked_p_ratio: f32,
+    edges_m: (f32, f32),
+    search: Search,
+    /// Posture for which it looks, and the least ratio p/Q22 that it requires beyond the setting; `None` before the first.
+    searched_for: Option<(Posture, f32)>,
     /// Whether both edges have been found for these.
     is_fresh: bool,
     /// The last reference followed: position (m) and velocity (m/s).
@@ -66,11 +61,9 @@ impl EdgeGovernor {
     /// for the arm's reach (m).
     pub fn new(settings: &GovernorSettings, tick_s: f32, distance_m: f32, reach_m: f32) -> Self {
         Self {
-            lower_m: -USABLE_REACH * reach_m,
-            upper_m: USABLE_REACH * reach_m,
-            search: None,
-            posture: Posture::ElbowDown,
-            asked_p_ratio: 0.0,
+            edges_m: (-USABLE_REACH * reach_m, USABLE_REACH * reach_m),
+            search: Search::start(1.0, 0.0),
+            searched_for: None,
             is_fresh: false,
             position_m: 0.0,
             velocity_m_s: 0.0,
@@ -91,12 +84,13 @@ impl EdgeGovernor {
 
     /// Returns the edges of the admissible stretch, m.
     pub fn edges_m(&self) -> (f32, f32) {
-        (self.lower_m, self.upper_m)
+        self.edges_m
     }
 
-    /// Returns the edges once both have been found for the present requirement.
-    pub fn fresh_edges_m(&self) -> Option<(f32, f32)> {
-        self.is_fresh.then_some((self.lower_m, self.upper_m))
+    /// Returns the edges once both have been found for this posture and least p/Q22.
+    pub fn fresh_edges_m(&self, posture: Posture, landing_p_ratio: f32) -> Option<(f32, f32)> {
+        let is_fresh = self.is_fresh && self.searched_for == Some((posture, landing_p_ratio));
+        is_fresh.then_some(self.edges_m)
     }
 
     /// Returns whether an edge holds the reference back.
@@ -115,18 +109,20 @@ impl EdgeGovernor {
         landing_p_ratio: f32,
     ) {
         let reach = USABLE_REACH * arm.reach_on_belt_m();
-        if posture != self.posture {
-            (self.lower_m, self.upper_m) = (-reach, reach);
-        }
-        if posture != self.posture || landing_p_ratio != self.asked_p_ratio {
-            self.posture = posture;
-            self.asked_p_ratio = landing_p_ratio;
-            self.search = None;
+        if self.searched_for != Some((posture, landing_p_ratio)) {
+            if self
+                .searched_for
+                .is_none_or(|(before, _)| before != posture)
+            {
+                self.edges_m = (-reach, reach);
+            }
+            self.searched_for = Some((posture, landing_p_ratio));
+            self.search = Search::start(1.0, tip_t_m);
             self.is_fresh = false;
         }
-        let search = self.search.unwrap_or(Search::start(1.0, tip_t_m));
+        let search = self.search;
         let direction = search.direction;
-        let point_m = search.point(2.0 * reach / STEPS_OVER_REACH, reach);
+        let point_m = search.point(reach);
         let worst_friction = friction.coefficient + self.settings.deviations * friction.deviation();
         let least_p_ratio = self.settings.p_ratio.at_least(landing_p_ratio);
         let there_m = point_m + direction * self.distance_m;
@@ -144,19 +140,19 @@ impl EdgeGovernor {
         });
         let edge_m = match search.next(point_m, excess_per_kg, reach) {
             ControlFlow::Continue(search) => {
-                self.search = Some(search);
+                self.search = search;
                 return;
             }
             ControlFlow::Break(edge_m) => edge_m,
         };
         if direction > 0.0 {
-            self.upper_m = edge_m;
+            self.edges_m.1 = edge_m;
         } else {
             // A stretch shorter than both margins shrinks to a point.
-            self.lower_m = edge_m.at_most(self.upper_m);
+            self.edges_m.0 = edge_m.at_most(self.edges_m.1);
             self.is_fresh = true;
         }
-        self.search = Some(Search::start(-direction, tip_t_m));
+        self.search = Search::start(-direction, tip_t_m);
     }
 
     /// Returns the reference to follow instead of `wanted`, one tick after the last one.
@@ -165,7 +161,7 @@ impl EdgeGovernor {
         if !self.settings.enabled {
             return *wanted;
         }
-        let (lower, upper) = (self.lower_m, self.upper_m);
+        let (lower, upper) = self.edges_m;
         let outside = |position: f32| position > upper || position < lower;
         let speed = wanted.velocity_m_s;
         let stop_m = wanted.position_m + 0.5 * speed * speed.abs() / braking_m_s2;
@@ -200,7 +196,8 @@ impl EdgeGovernor {
             -stopping_speed((self.position_m - lower).at_least(0.0)),
             stopping_speed((upper - self.position_m).at_least(0.0)),
         );
-        // Beyond an edge that has moved inwards, the limit above only forbids going further out.
+        // Beyond an edge that has moved inwards, the limit above only forbids going further out. Twice the braking, so that
+        // the velocity follows a stopping speed, which falls by one in a tick, with a margin.
         let step = 2.0 * braking_m_s2 * tick_s;
         let change = (velocity - self.velocity_m_s).within(step);
         let velocity = self.velocity_m_s + change;

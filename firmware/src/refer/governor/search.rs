@@ -4,9 +4,11 @@ use core::ops::ControlFlow;
 
 use painleve_shared::Real;
 
+/// Number of points from one end of the reach to the other in the outward search.
+const STEPS_OVER_REACH: f32 = 32.0;
 /// Largest number of inadmissible points that the search tries beside the tip, on both sides together. A stretch farther
 /// off is not for this tip: on the way there it would be thrown off.
-const MOST_REFUSED: u32 = 8;
+const MOST_REFUSED: u32 = STEPS_OVER_REACH as u32 / 4;
 /// Halvings of the last step: 12 mm / 2¹⁰ is 11 µm.
 const HALVINGS: u32 = 10;
 
@@ -53,7 +55,8 @@ impl Search {
     }
 
     /// Returns the next point to evaluate, m.
-    pub(super) fn point(&self, step_m: f32, reach_m: f32) -> f32 {
+    pub(super) fn point(&self, reach_m: f32) -> f32 {
+        let step_m = 2.0 * reach_m / STEPS_OVER_REACH;
         let point = match self.stage {
             // Alternate between the side towards the middle of the belt and the other side.
             Stage::Entering { refused, .. } => {
