@@ -36,8 +36,6 @@ const SLOWER_KG: f32 = 1.0;
 
 /// Fraction of the torque limit available for pressing the tip on the belt; the rest is for motion.
 const TORQUE_USED: f32 = 0.95;
-/// Least desired force by which the present one is divided, N.
-const LEAST_FORCE_N: f32 = 1e-3;
 
 /// Returns the fraction of `pressing_nm`, at least `least`, that keeps both joints within ±`limit_nm` together with
 /// `motion_nm`.
@@ -64,17 +62,11 @@ fn affordable_part(
     pressing_nm: &JointTorque<f32>,
     limit_nm: f32,
 ) -> f32 {
-    let of_joint = |motion: f32, pressing: f32| {
-        if (motion + pressing).abs() <= limit_nm {
-            1.0
-        } else {
-            // Not finite without a pressing torque; the motion alone is then beyond the limit.
-            (limit_nm.copysign(pressing) - motion) / pressing
-        }
-    };
-    of_joint(motion_nm.first(), pressing_nm.first())
+    // Not finite without a pressing torque: then a motion within the limit leaves enough.
+    let of_joint = |motion: f32, pressing: f32| (limit_nm.copysign(pressing) - motion) / pressing;
+    1.0_f32
+        .at_most(of_joint(motion_nm.first(), pressing_nm.first()))
         .at_most(of_joint(motion_nm.second(), pressing_nm.second()))
-        .limited(0.0, 1.0)
 }
 
 /// The hybrid law's state.
@@ -119,8 +111,8 @@ impl Law for HybridSettings {
         // Limit to the friction cone: a saturated force cell gives any ratio.
         let cone_n = input.contact.friction.coefficient * force_n;
         *state = HybridState {
-            pressing: (force_n / self.normal_force_n.at_least(LEAST_FORCE_N))
-                .at_least(self.least_pressing),
+            // Without a desired force there is no part of it.
+            pressing: self.least_pressing.at_least(force_n / self.normal_force_n),
             filtered_friction_n: input.contact.force_n.x.within(cone_n),
             slow_force_n: input.contact.force_n.y,
             fed_force_n: input.contact.force_n,
