@@ -270,7 +270,7 @@ impl StateMachineTest for SupervisorTest {
                     let arms = before != phase.state && phase.state == SupervisorState::Armed;
                     assert_eq!(phase.arms, arms);
                     // Off is off at once, and nothing drives with a fault.
-                    assert!(!phase.drives() || enable && supervisor.fault().is_none());
+                    assert!(!phase.state.drives() || enable && supervisor.fault().is_none());
                 }
             }
             Event::Fault(fault) => supervisor.latch(fault),

@@ -9,12 +9,12 @@ use super::arrival::ArrivalState;
 use crate::configuration::Configuration;
 use crate::demand::TorqueDemand;
 use crate::estimate::joints::{JointEstimatorSettings, Restart};
-use crate::estimate::{ContactEstimate, EstimateSettings, Estimators, Observed};
+use crate::estimate::{EstimateSettings, Estimators, Observed};
 use crate::last_command::LastCommand;
 use crate::law::Law;
+use crate::refer::References;
 use crate::refer::governor::EdgeGovernor;
 use crate::refer::reference::ReferenceGenerator;
-use crate::refer::{References, Target};
 use crate::schedule::Turn;
 use crate::supervise::supervisor::Supervisor;
 use crate::telemetry::Telemetry;
@@ -112,7 +112,7 @@ impl<L: Law> Stages<L> {
         let landing = self.demand.flight.map(|flight| flight.posture);
         let target = self.references.tick(&self.estimates, &phase, landing);
         self.observed.elapsed_ticks = elapsed_ticks;
-        if phase.drives() {
+        if phase.state.drives() {
             let output = self
                 .demand
                 .tick(&self.estimates, &phase, &target, self.command.saturated);
@@ -129,11 +129,18 @@ impl<L: Law> Stages<L> {
         answer.torques = command.counts;
         answer.reference_tip = Micrometres::from_metres(target.reference.position_m);
         answer.estimated_tip = Micrometres::from_metres(estimates.model.tip_m.x);
-        answer.flags = flags(&estimates.contact, &target, command);
-        let is_done = self.references.is_done();
-        answer.flags.set(StatusFlags::REFERENCE_DONE, is_done);
+        let (touches, friction) = (estimates.contact.touches, &estimates.contact.friction);
         let recovers = target.recovering && self.supervisor.drives();
-        answer.flags.set(StatusFlags::RECOVERING, recovers);
+        let slips = touches && friction.slip == Slip::Negative;
+        let mut flags = StatusFlags::default();
+        flags.set(StatusFlags::CONTACT, touches);
+        flags.set(StatusFlags::SATURATED, command.saturated);
+        flags.set(StatusFlags::REFERENCE_DONE, self.references.is_done());
+        flags.set(StatusFlags::AT_EDGE, target.at_edge);
+        flags.set(StatusFlags::RECOVERING, recovers);
+        flags.set(StatusFlags::SLIP_NEGATIVE, slips);
+        flags.set(StatusFlags::STICKS, touches && friction.sticks);
+        answer.flags = flags;
         report(answer, &self.supervisor);
         if let Some(telemetry) = telemetry {
             telemetry.record(estimates, &target, command, &self.supervisor);
@@ -196,19 +203,4 @@ impl<L: Law> Stages<L> {
 pub fn report(answer: &mut ActuatorFrame, supervisor: &Supervisor) {
     answer.state = supervisor.state() as u8;
     answer.fault = supervisor.fault().map_or(0, |fault| fault as u8);
-}
-
-/// Returns the answer's flags that contact, target and command show.
-fn flags(contact: &ContactEstimate, target: &Target, command: &LastCommand) -> StatusFlags {
-    let friction = &contact.friction;
-    let mut flags = StatusFlags::default();
-    flags.set(StatusFlags::CONTACT, contact.touches);
-    flags.set(StatusFlags::SATURATED, command.saturated);
-    flags.set(StatusFlags::AT_EDGE, target.at_edge);
-    flags.set(
-        StatusFlags::SLIP_NEGATIVE,
-        contact.touches && friction.slip == Slip::Negative,
-    );
-    flags.set(StatusFlags::STICKS, contact.touches && friction.sticks);
-    flags
 }

@@ -89,7 +89,7 @@ impl References {
             0.0
         };
         let tip_t_m = model.tip_m.x;
-        let drives = phase.drives();
+        let drives = phase.state.drives();
         // While the drive is off, the edges are searched for the posture in which it would be armed.
         if phase.arms || !drives {
             self.posture = Posture::of(&model.theta_rad);

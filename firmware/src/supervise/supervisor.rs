@@ -79,13 +79,6 @@ pub struct Phase {
     pub recovers: bool,
 }
 
-impl Phase {
-    /// Returns whether torque may be applied.
-    pub fn drives(&self) -> bool {
-        self.state.drives()
-    }
-}
-
 impl Supervisor {
     /// Makes a supervisor that is called `tick_hz` times a second.
     pub fn new(settings: SupervisorSettings, limits: LapseLimits, tick_hz: f32) -> Self {
