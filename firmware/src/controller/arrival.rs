@@ -65,30 +65,35 @@ fn irregular(
     ahead: u32,
     (encoders, forces): (bool, bool),
 ) -> Arrival {
+    let (first, lapses) = (&mut None, &mut supervisor.lapses);
     for (input, lapse) in BOARD_LAPSES {
-        supervisor.note(lapse, u32::from(frame.inputs.contains(input)));
+        lapses.note_among(first, lapse, u32::from(frame.inputs.contains(input)));
     }
     // More than half the counter's range ahead means behind.
     let stale = ahead == 0 || ahead > u32::MAX / 2;
-    supervisor.note(Lapse::StaleFrame, u32::from(stale));
-    if stale {
-        // A sender that has started anew counts from another number: follow it once its frames have latched a fault, so
-        // that it can reset the fault.
-        if supervisor.fault().is_some() {
-            state.last_sequence = Some(frame.sequence);
-        }
-        return Arrival::Stale;
-    }
-    state.last_sequence = Some(frame.sequence);
-    supervisor.note(Lapse::LostFrame, ahead - 1);
-    supervisor.note(Lapse::EncoderOutOfRange, u32::from(!encoders));
-    supervisor.note(Lapse::ForceOutOfRange, u32::from(!forces));
-    let ticks = ahead.saturating_add(state.unread_ticks);
-    if encoders && forces {
-        state.unread_ticks = 0;
-        Arrival::After(ticks)
+    lapses.note_among(first, Lapse::StaleFrame, u32::from(stale));
+    let arrival = if stale {
+        Arrival::Stale
     } else {
-        state.unread_ticks = ticks.min(MOST_LOST_TICKS);
-        Arrival::OutOfRange
+        lapses.note_among(first, Lapse::LostFrame, ahead - 1);
+        lapses.note_among(first, Lapse::EncoderOutOfRange, u32::from(!encoders));
+        lapses.note_among(first, Lapse::ForceOutOfRange, u32::from(!forces));
+        let ticks = ahead.saturating_add(state.unread_ticks);
+        if encoders && forces {
+            state.unread_ticks = 0;
+            Arrival::After(ticks)
+        } else {
+            state.unread_ticks = ticks.min(MOST_LOST_TICKS);
+            Arrival::OutOfRange
+        }
+    };
+    if let Some(lapse) = first {
+        supervisor.latch(lapse.fault());
     }
+    // A sender that has started anew counts from another number: follow it once its frames have latched a fault, so that
+    // it can reset the fault.
+    if !stale || supervisor.fault().is_some() {
+        state.last_sequence = Some(frame.sequence);
+    }
+    arrival
 }

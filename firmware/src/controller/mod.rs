@@ -178,7 +178,7 @@ impl<L: Law> Controller<L> {
 
     /// Returns how often each kind of lapse has occurred.
     pub fn lapse_counts(&self) -> &LapseMonitor {
-        self.stages.supervisor.lapses()
+        &self.stages.supervisor.lapses
     }
 
     #[inline]

@@ -189,16 +189,16 @@ impl<D: Drive, L: Law> ControlTask<D, L> {
             return;
         };
         self.sensor = self.drive.sample();
-        let missing = self.sensor.is_none() && self.source == FrameSource::Realtime;
-        let stopped = controller.note(Lapse::MissingFrame, u32::from(missing));
         let Some(frame) = &self.sensor else {
-            if let Some(stopped) = stopped {
+            let missing = u32::from(self.source == FrameSource::Realtime);
+            if let Some(stopped) = controller.note(Lapse::MissingFrame, missing) {
                 self.drive.actuate(&stopped);
                 self.elapsed = 0;
                 self.due = Due::Report;
             }
             return;
         };
+        controller.note(Lapse::MissingFrame, 0);
         let start = self.drive.stopwatch();
         let answer = match &mut self.open_loop {
             None => controller.answer(frame),

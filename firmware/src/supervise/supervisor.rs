@@ -63,7 +63,8 @@ pub struct Supervisor {
     inputs: DigitalInputs,
     settings: SupervisorSettings,
     tick_hz: f32,
-    lapses: LapseMonitor,
+    /// How often each kind of lapse has occurred.
+    pub(crate) lapses: LapseMonitor,
 }
 
 /// The supervisor's decision at one tick.
@@ -188,11 +189,6 @@ impl Supervisor {
     /// Returns whether torque may be applied.
     pub fn drives(&self) -> bool {
         self.state.drives()
-    }
-
-    /// Returns how often each kind of lapse has occurred.
-    pub fn lapses(&self) -> &LapseMonitor {
-        &self.lapses
     }
 
     /// Records how many times a lapse occurred, 0 for none. Returns whether this has just latched a
