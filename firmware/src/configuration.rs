@@ -120,8 +120,9 @@ pub struct Configuration<L: Law = LawSettings> {
     pub settings: ControllerSettings<L>,
 }
 
-/// Returns the lower natural frequency of the arm on elastic gears of these compliances (rad/(N·m)) behind motors at
-/// rest: 1/√(c J), with the stretched arm's inertia J about each joint. It is infinite for stiff gears.
+/// Returns the lower of the natural frequencies of the stretched arm about either joint, on elastic gears of these
+/// compliances (rad/(N·m)) behind motors at rest: 1/√(c J). The inertia J contains the joint's rotor, as the arm's model
+/// does, although it is at rest: loops behind heavy rotors are slower than they need be. Infinite for stiff gears.
 fn natural_frequency_rad_s(arm: &Arm<f32>, compliance_rad_nm: [f32; 2]) -> f32 {
     let inertia_kg_m2 = arm.mass_matrix(&Pose::new(&LinkMotion::zeros()));
     let [soft_1, soft_2] = compliance_rad_nm;

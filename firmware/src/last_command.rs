@@ -1,11 +1,10 @@
-//! The last commanded torques: the only value that flows from one tick's output to the next tick.
+//! The last command: what flows from one tick's output to the next tick.
 
 use nalgebra::Vector2;
 use painleve_shared::counts::TorqueCounts;
 use painleve_shared::{JointMotion, JointTorque};
 
-/// The last commanded torques and their expected effect: the only state the controller keeps of its
-/// output. The default is no torque.
+/// The last commanded torques and their expected effect. The default is no torque.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct LastCommand {
     /// Counts for the torque stages.

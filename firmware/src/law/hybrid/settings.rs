@@ -14,8 +14,8 @@ settings! {
             time_constant_s: f32, 0.0..=10.0, "s";
         },
         /// The estimated friction −μ̂ s α_f, corrected by the low-passed reading: d̂ += k (f_t + μ̂
-        /// s α_f − d̂) with k = min(T/τ, ½ p̂/Q22). The pole of the loop through the contact, 1 − k
-        /// Q22/p, then stays near ½ even close to the edge.
+        /// s α_f − d̂) with k = min(T/(τ + T), ⅓ p̂/Q22). The pole of the loop through the contact, 1 − k
+        /// Q22/p, then stays at ⅔ or above even close to the edge.
         "observed" => Observed {
             /// Time constant τ far from the edge.
             time_constant_s: f32, 0.0..=10.0, "s";
