@@ -42,8 +42,8 @@ pub struct EdgeGovernor {
     search: Search,
     /// Posture for which it looks, and the least ratio p/Q22 that it requires beyond the setting; `None` before the first.
     searched_for: Option<(Posture, f32)>,
-    /// Whether both edges have been found for these.
-    is_fresh: bool,
+    /// For what both edges have been found, if anything.
+    found_for: Option<(Posture, f32)>,
     /// The last reference followed: position (m) and velocity (m/s).
     position_m: f32,
     velocity_m_s: f32,
@@ -64,7 +64,7 @@ impl EdgeGovernor {
             edges_m: (-USABLE_REACH * reach_m, USABLE_REACH * reach_m),
             search: Search::start(1.0, 0.0),
             searched_for: None,
-            is_fresh: false,
+            found_for: None,
             position_m: 0.0,
             velocity_m_s: 0.0,
             follows: false,
@@ -89,8 +89,7 @@ impl EdgeGovernor {
 
     /// Returns the edges once both have been found for this posture and least p/Q22.
     pub fn fresh_edges_m(&self, posture: Posture, landing_p_ratio: f32) -> Option<(f32, f32)> {
-        let is_fresh = self.is_fresh && self.searched_for == Some((posture, landing_p_ratio));
-        is_fresh.then_some(self.edges_m)
+        (self.found_for == Some((posture, landing_p_ratio))).then_some(self.edges_m)
     }
 
     /// Returns whether an edge holds the reference back.
@@ -118,7 +117,7 @@ impl EdgeGovernor {
             }
             self.searched_for = Some((posture, landing_p_ratio));
             self.search = Search::start(1.0, tip_t_m);
-            self.is_fresh = false;
+            self.found_for = None;
         }
         let search = self.search;
         let direction = search.direction;
@@ -150,7 +149,7 @@ impl EdgeGovernor {
         } else {
             // A stretch shorter than both margins shrinks to a point.
             self.edges_m.0 = edge_m.at_most(self.edges_m.1);
-            self.is_fresh = true;
+            self.found_for = self.searched_for;
         }
         self.search = Search::start(-direction, tip_t_m);
     }
