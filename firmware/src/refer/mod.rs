@@ -25,8 +25,8 @@ pub struct Target {
     pub posture: Posture,
     /// Edges of the admissible stretch of the belt, m.
     pub edges_m: (f32, f32),
-    /// The edges, once found for the present posture and least p.
-    pub fresh_edges_m: Option<(f32, f32)>,
+    /// Whether the edges have been found for the landing of a tip that must be returned to the belt.
+    pub edges_for_landing: bool,
     /// Whether an edge holds the reference back.
     pub at_edge: bool,
     /// Whether the tip must be returned to the belt before it can follow.
@@ -125,12 +125,10 @@ impl References {
             requested_m: wanted.position_m,
             posture: self.posture,
             edges_m: self.governor.edges_m(),
-            fresh_edges_m: if recovering {
-                self.governor
-                    .fresh_edges_m(self.posture, self.asked_p_ratio)
-            } else {
-                None
-            },
+            edges_for_landing: recovering
+                && self
+                    .governor
+                    .has_edges_for(self.posture, self.asked_p_ratio),
             at_edge: drives && self.governor.is_at_edge(),
             recovering,
         }

@@ -76,7 +76,8 @@ impl SetDown {
         let mut governor = EdgeGovernor::new(settings, tick_s, away_m, reach_m);
         let found = (0..MOST_CALLS).find_map(|_| {
             governor.search(&arm, posture, best_m, &friction, 0.0);
-            governor.fresh_edges_m(posture, 0.0)
+            let is_found = governor.has_edges_for(posture, 0.0);
+            is_found.then(|| governor.edges_m())
         });
         let clipped = |(lower_m, upper_m): (f32, f32)| {
             f64::from(lower_m.max(-farthest_m))..f64::from(upper_m.min(farthest_m))

@@ -87,9 +87,9 @@ impl EdgeGovernor {
         self.edges_m
     }
 
-    /// Returns the edges once both have been found for this posture and least p/Q22.
-    pub fn fresh_edges_m(&self, posture: Posture, landing_p_ratio: f32) -> Option<(f32, f32)> {
-        (self.found_for == Some((posture, landing_p_ratio))).then_some(self.edges_m)
+    /// Returns whether both edges have been found for this posture and least p/Q22.
+    pub fn has_edges_for(&self, posture: Posture, landing_p_ratio: f32) -> bool {
+        self.found_for == Some((posture, landing_p_ratio))
     }
 
     /// Returns whether an edge holds the reference back.

@@ -158,7 +158,7 @@ fn without_an_admissible_place_nearby_the_tip_is_led_to_the_best_one_and_not_acr
     let mut tip_t_m = 0.03;
     for _ in 0..3000 {
         governor.search(&arm(), Posture::ElbowDown, tip_t_m, &friction, 0.0);
-        if governor.fresh_edges_m(Posture::ElbowDown, 0.0).is_some() {
+        if governor.has_edges_for(Posture::ElbowDown, 0.0) {
             let (lower_m, upper_m) = governor.edges_m();
             tip_t_m += (tip_t_m.max(lower_m).min(upper_m) - tip_t_m).clamp(-1e-3, 1e-3);
         }
@@ -263,15 +263,12 @@ fn a_moving_reference_is_caught_without_a_step_at_any_rate() {
 fn edges_of_the_other_posture_are_forgotten() {
     let friction = known(0.6, Slip::Positive);
     let mut governor = searched(0.0, Posture::ElbowDown, &friction);
-    let fresh = |governor: &EdgeGovernor, posture, landing| {
-        governor.fresh_edges_m(posture, landing).is_some()
-    };
-    assert!(fresh(&governor, Posture::ElbowDown, 0.0));
+    assert!(governor.has_edges_for(Posture::ElbowDown, 0.0));
     // Before the search for others, too.
-    assert!(!fresh(&governor, Posture::ElbowUp, 0.0));
-    assert!(!fresh(&governor, Posture::ElbowDown, 0.2));
+    assert!(!governor.has_edges_for(Posture::ElbowUp, 0.0));
+    assert!(!governor.has_edges_for(Posture::ElbowDown, 0.2));
     governor.search(&arm(), Posture::ElbowUp, 0.0, &friction, 0.0);
-    assert!(!fresh(&governor, Posture::ElbowUp, 0.0));
+    assert!(!governor.has_edges_for(Posture::ElbowUp, 0.0));
     let (_, upper_m) = governor.edges_m();
     assert!(upper_m > 0.183, "{upper_m}");
 }
