@@ -26,7 +26,8 @@ settings! {
 /// Narrows the bounds of the belt's speed at each tick.
 #[derive(Clone, Copy, Debug)]
 pub struct BeltEstimator {
-    settings: BeltSpeedSettings,
+    /// Whether the speed is known.
+    is_given: bool,
     /// Change of the belt's speed in one tick, m/s.
     widening_m_s: f32,
     /// Bounds of the belt's speed.
@@ -35,13 +36,14 @@ pub struct BeltEstimator {
 }
 
 impl BeltEstimator {
-    /// Makes an estimator without information that is called every `tick_s`.
+    /// Makes an estimator that knows at most a given speed, and is called every `tick_s`.
     pub fn new(settings: &BeltSpeedSettings, tick_s: f32) -> Self {
+        let given = settings.given_m_s;
         Self {
-            settings: *settings,
+            is_given: given.is_some(),
             widening_m_s: settings.acceleration_m_s2 * tick_s,
-            slowest_m_s: f32::NEG_INFINITY,
-            fastest_m_s: f32::INFINITY,
+            slowest_m_s: given.unwrap_or(f32::NEG_INFINITY),
+            fastest_m_s: given.unwrap_or(f32::INFINITY),
         }
     }
 
@@ -49,7 +51,7 @@ impl BeltEstimator {
     /// estimate.
     #[inline]
     pub fn update(&mut self, tip_velocity_m_s: f32, friction: Option<&FrictionEstimate>) {
-        if self.settings.given_m_s.is_some() {
+        if self.is_given {
             return;
         }
         let widening = self.widening_m_s;
@@ -69,19 +71,16 @@ impl BeltEstimator {
     }
 
     /// Returns the lowest and highest speed that the belt may have, m/s.
-    pub fn bounds_m_s(&self) -> (f32, f32) {
-        let known = (self.slowest_m_s, self.fastest_m_s);
-        self.settings
-            .given_m_s
-            .map_or(known, |speed| (speed, speed))
+    #[cfg(test)]
+    fn bounds_m_s(&self) -> (f32, f32) {
+        (self.slowest_m_s, self.fastest_m_s)
     }
 
     /// Returns whether the bounds allow a belt as fast as a tip with this velocity (m/s), which is then in
     /// stick.
     pub fn may_stick(&self, tip_velocity_m_s: f32) -> bool {
-        let (slowest_m_s, fastest_m_s) = self.bounds_m_s();
-        tip_velocity_m_s > slowest_m_s - BOUND_ERROR_M_S
-            && tip_velocity_m_s < fastest_m_s + BOUND_ERROR_M_S
+        tip_velocity_m_s > self.slowest_m_s - BOUND_ERROR_M_S
+            && tip_velocity_m_s < self.fastest_m_s + BOUND_ERROR_M_S
     }
 }
 

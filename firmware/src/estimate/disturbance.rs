@@ -31,9 +31,9 @@ settings! {
 /// The low-pass of the residual.
 #[derive(Clone, Copy, Debug)]
 pub struct DisturbanceEstimator {
-    bandwidth_rad_s: f32,
+    /// Fraction of the residual adopted at once far from the edge.
+    weight: f32,
     limit_nm: f32,
-    period_s: f32,
     /// Generalised torque d on the arm in addition to the model's torques, N·m.
     pub torque_nm: GeneralisedTorque<f32>,
     /// θ̇ at the previous update, rad/s.
@@ -55,9 +55,8 @@ impl DisturbanceEstimator {
     /// Makes an estimator that is updated every `period_s`, for stages with torques up to `torque_limit_nm`.
     pub fn new(settings: &DisturbanceSettings, torque_limit_nm: f32, period_s: f32) -> Self {
         Self {
-            bandwidth_rad_s: settings.bandwidth_rad_s,
+            weight: settings.bandwidth_rad_s * period_s,
             limit_nm: LARGEST * torque_limit_nm,
-            period_s,
             torque_nm: GeneralisedTorque::zeros(),
             rate_rad_s: None,
             acted: Acted::default(),
@@ -91,7 +90,7 @@ impl DisturbanceEstimator {
             return;
         }
         let share = p_ratio.map_or(1.0, |p_ratio| (SHARE * p_ratio).limited(0.0, loop_share));
-        let weight = (self.bandwidth_rad_s * self.period_s).at_most(share);
+        let weight = self.weight.at_most(share);
         self.torque_nm =
             (self.torque_nm + residual_nm * weight).map(|torque| torque.within(limit_nm));
     }

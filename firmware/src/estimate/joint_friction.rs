@@ -17,17 +17,10 @@ pub struct JointFriction {
     is_zero: bool,
     /// Compensated Coulomb friction, N·m.
     coulomb_nm: [f32; 2],
-    /// The joints between ticks.
-    joints: [Travel; 2],
-}
-
-/// Travel and friction of one joint.
-#[derive(Clone, Copy, Debug, Default)]
-struct Travel {
-    /// Angle at the last tick, rad; absent before the first.
-    angle_rad: Option<f32>,
+    /// Joint angles at the last tick, rad; absent before the first.
+    angles_rad: Option<JointMotion<f32>>,
     /// Friction, positive against a positive rate, N·m.
-    torque_nm: f32,
+    torque_nm: JointTorque<f32>,
 }
 
 impl JointFriction {
@@ -37,7 +30,8 @@ impl JointFriction {
         Self {
             is_zero: coulomb_nm == [0.0; 2],
             coulomb_nm,
-            joints: [Travel::default(); 2],
+            angles_rad: None,
+            torque_nm: JointTorque::zeros(),
         }
     }
 
@@ -51,24 +45,18 @@ impl JointFriction {
     // Out of line: few arms need it.
     #[inline(never)]
     pub fn tick(&mut self, angles_rad: &JointMotion<f32>) -> GeneralisedTorque<f32> {
-        let angles = [angles_rad.first(), angles_rad.second()];
-        let joints = self.joints.iter_mut().zip(self.coulomb_nm).zip(angles);
-        let mut changes_nm = [0.0; 2];
-        for (((joint, coulomb_nm), angle_rad), change_nm) in joints.zip(&mut changes_nm) {
-            let before_rad = joint.angle_rad.replace(angle_rad).unwrap_or(angle_rad);
-            let travel = ((angle_rad - before_rad) * (1.0 / TRAVEL_RAD)).within(1.0);
-            *change_nm = travel * coulomb_nm - travel.abs() * joint.torque_nm;
-            joint.torque_nm += *change_nm;
-        }
-        let [one, two] = changes_nm;
-        JointTorque::new(one, two).to_links()
+        let before_rad = self.angles_rad.replace(*angles_rad).unwrap_or(*angles_rad);
+        let travel = ((*angles_rad - before_rad) * (1.0 / TRAVEL_RAD)).map(|it| it.within(1.0));
+        let left_nm = travel.map(f32::abs).torque_by(self.torque_nm.to_array());
+        let change_nm = travel.torque_by(self.coulomb_nm) - left_nm;
+        self.torque_nm += change_nm;
+        change_nm.to_links()
     }
 
     /// Returns the friction, positive against a positive rate, as a torque on the links, N·m.
     #[inline]
     pub fn torque_nm(&self) -> GeneralisedTorque<f32> {
-        let [one, two] = &self.joints;
-        JointTorque::new(one.torque_nm, two.torque_nm).to_links()
+        self.torque_nm.to_links()
     }
 }
 
