@@ -8,8 +8,16 @@ use painleve_shared::{Arm, Slip};
 use super::arrival::ArrivalState;
 use crate::configuration::Configuration;
 use crate::demand::TorqueDemand;
-use crate::estimate::joints::{JointEstimatorSettings, Restart};
-use crate::estimate::{EstimateSettings, Estimators, Observed};
+use crate::estimate::belt::BeltEstimator;
+use crate::estimate::calibration::LengthCalibrator;
+use crate::estimate::contact::ContactDetector;
+use crate::estimate::disturbance::DisturbanceEstimator;
+use crate::estimate::friction::FrictionEstimator;
+use crate::estimate::joint_friction::JointFriction;
+use crate::estimate::joints::{JointEstimator, JointEstimatorSettings, Restart};
+use crate::estimate::model::Model;
+use crate::estimate::response::ResponseEstimator;
+use crate::estimate::{ContactEstimate, Estimators, Observed};
 use crate::last_command::LastCommand;
 use crate::law::Law;
 use crate::refer::References;
@@ -45,46 +53,49 @@ impl<L: Law> Stages<L> {
     pub fn new(configuration: &Configuration<L>, arm: Arm<f32>) -> Self {
         let (converters, settings) = (&configuration.converters, &configuration.settings);
         let speed = configuration.loop_speed(&arm);
-        let estimates = EstimateSettings {
-            tick_hz: configuration.tick_hz,
-            encoders: converters.encoders,
-            force: converters.force,
-            torque_limit_nm: settings.torque_limit_nm,
-            coulomb_friction_nm: configuration.arm.coulomb_friction_nm,
-            joints: JointEstimatorSettings {
-                bandwidth_rad_s: speed * settings.estimator.bandwidth_rad_s,
-                ..settings.estimator
-            },
-            contact: &settings.contact,
-            friction: &settings.friction,
-            belt: &settings.belt,
-            response: &settings.response,
-            disturbance: &settings.disturbance,
-            calibration: &settings.calibration,
+        let joints = JointEstimatorSettings {
+            bandwidth_rad_s: speed * settings.estimator.bandwidth_rad_s,
+            ..settings.estimator
+        };
+        let (tick_hz, tick_s) = (configuration.tick_hz, configuration.tick_s());
+        let turn_s = Turn::COUNT * tick_s;
+        let (torque_limit_nm, [link_length_m, _]) = (settings.torque_limit_nm, arm.link_length_m());
+        let force_cell = converters.force.converter();
+        let estimates = Estimators {
+            contact: ContactEstimate::default(),
+            model: Model::default(),
+            arm,
+            joints: JointEstimator::new(&joints, converters.encoders, tick_hz),
+            decision: ContactDetector::new(&settings.contact),
+            friction: FrictionEstimator::new(&settings.friction, &settings.contact, tick_s),
+            belt: BeltEstimator::new(&settings.belt, tick_s),
+            response: ResponseEstimator::new(&settings.response, tick_s),
+            disturbance: DisturbanceEstimator::new(&settings.disturbance, torque_limit_nm, turn_s),
+            calibrator: LengthCalibrator::new(&settings.calibration, link_length_m, turn_s),
+            joint_friction: JointFriction::new(configuration.arm.coulomb_friction_nm),
+            force_cell,
+            force_range_n: force_cell.value(force_cell.maximum_counts),
+            tick_s,
         };
         Self {
-            estimates: Estimators::new(&estimates, arm),
+            estimates,
             command: LastCommand::default(),
             demand: TorqueDemand::new(configuration, speed),
-            supervisor: Supervisor::new(
-                settings.supervisor,
-                settings.lapses,
-                configuration.tick_hz,
-            ),
+            supervisor: Supervisor::new(settings.supervisor, settings.lapses, tick_hz),
             references: References::new(
                 EdgeGovernor::new(
                     &settings.governor,
-                    configuration.tick_s(),
+                    tick_s,
                     configuration.kept_distance_m(),
                     arm.reach_on_belt_m(),
                 ),
-                ReferenceGenerator::new(&settings.reference, configuration.tick_hz),
+                ReferenceGenerator::new(&settings.reference, tick_hz),
                 settings.recovery.minimum_p_ratio,
             ),
             observed: Observed::default(),
             turn: Turn::default(),
             arrivals: ArrivalState::default(),
-            torques: TorqueOutput::new(converters.torque, settings.torque_limit_nm),
+            torques: TorqueOutput::new(converters.torque, torque_limit_nm),
         }
     }
 
@@ -158,25 +169,14 @@ impl<L: Law> Stages<L> {
         let turn = self.turn.take();
         let (estimates, observed) = (&mut self.estimates, &self.observed);
         if estimates.contact.touches {
-            let slow = estimates.learn_in_contact(observed);
-            match turn {
-                Turn::Balance => {
-                    estimates.balance_torques();
-                    if slow.shows_length {
-                        estimates.calibrate();
-                    }
-                }
-                Turn::Edges if slow.completes_block => estimates.evaluate_response(),
-                Turn::Edges => self.references.search(&self.estimates),
+            if estimates.learn_in_contact(observed, turn) {
+                self.references.search(estimates);
             }
         } else {
-            estimates.learn_in_the_air(observed);
-            if turn == Turn::Balance {
-                estimates.balance_torques();
-            }
+            estimates.learn_in_the_air(observed, turn);
             // A tip that is being returned to the belt needs the edges soon.
             if turn == Turn::Edges || self.references.asks_for_landing() {
-                self.references.search(&self.estimates);
+                self.references.search(estimates);
             }
         }
     }

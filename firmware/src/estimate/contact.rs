@@ -15,9 +15,9 @@ use painleve_shared::{Real, settings};
 /// Log-odds beyond which contact or flight is certain, and the most that one reading adds to them.
 const CERTAIN: f32 = 6.0;
 /// Log-odds at which the decision changes.
-const DECISION: f32 = 3.0;
+const DECISION: f32 = CERTAIN / 2.0;
 /// Largest contribution of a gap to contact.
-const GAP_FOR: f32 = 2.0;
+const GAP_FOR: f32 = CERTAIN / 3.0;
 /// Slope of the log-odds over the gap in units of its uncertainty.
 const GAP_SLOPE: f32 = 16.0;
 /// Variance of an innovation due to rounding, counts².
@@ -131,11 +131,6 @@ impl ContactDetector {
         self.contact
     }
 
-    /// Returns the contact decision.
-    pub fn touches(&self) -> bool {
-        self.contact
-    }
-
     /// Returns whether flight is certain; initially it is not.
     pub fn is_in_flight(&self) -> bool {
         !self.contact && self.log_odds < -DECISION
@@ -202,7 +197,7 @@ mod tests {
             // Quantisation alone.
             detector.update_from_encoders(&gap(if tick % 7 < 3 { 49e-6 } else { -49e-6 }));
         }
-        assert!(detector.touches());
+        assert!(detector.contact);
         assert!(ticks_until(false, || detector.update_from_encoders(&gap(100e-6))) <= 3);
         assert!(ticks_until(true, || detector.update_from_encoders(&gap(0.0))) <= 8);
     }

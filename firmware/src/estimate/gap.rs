@@ -11,7 +11,7 @@ impl Estimators {
     /// Returns the measured height of the tip above the belt, m.
     #[inline]
     pub(super) fn gap_m(&self) -> f32 {
-        let residual = self.joints.innovation_rad() * self.joints.residual_share();
+        let residual = self.joints.residual_rad();
         let model = &self.model;
         let jacobian = &model.jacobian;
         model.gap_m + jacobian.m21 * residual.first() + jacobian.m22 * residual.second()
@@ -20,15 +20,16 @@ impl Estimators {
     /// Returns the contact evidence from the encoders.
     pub(super) fn encoder_reading(&self, last: &LastCommand) -> EncoderReading {
         let model = &self.model;
-        let count = self.joints.count_rad();
+        let count_rad = self.joints.rad_per_count;
         // Half a count of each encoder; the second encoder affects θ2 alone.
-        let rounding_m = 0.5 * (model.tip_m.x.abs() * count.x + model.jacobian.m22.abs() * count.y);
+        let rounding_m =
+            0.5 * (model.tip_m.x.abs() * count_rad + model.jacobian.m22.abs() * count_rad);
         // Steady innovation after the contact force has vanished.
         let release = -self.joints.lag_counts(&last.contact_acceleration_rad_s2);
         EncoderReading {
             gap_m: self.gap_m(),
             gap_error_m: GAP_UNCERTAINTY_M + self.calibrator.gap_error_m(rounding_m),
-            moved: self.joints.has_moved(),
+            moved: self.joints.moved,
             release: release.dot(&self.joints.innovation_counts()),
             full_release: release.norm_squared(),
         }

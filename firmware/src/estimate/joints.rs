@@ -16,7 +16,7 @@ use nalgebra::Vector2;
 use painleve_shared::counts::{EncoderCounts, EncoderScale};
 use painleve_shared::{JointMotion, JointTorque, LinkMotion, Pose, Real, settings};
 
-use super::encoder_correction::{EncoderCorrection, EncoderCorrector};
+use super::encoder_correction::EncoderCorrection;
 
 settings! {
     /// Settings of the tracking loops.
@@ -50,52 +50,35 @@ pub enum Restart {
     EncoderJump,
 }
 
-/// Tracking loop of one joint.
-#[derive(Clone, Copy, Debug, Default)]
-struct TrackingLoop {
-    reading: EncoderCounts,
-    /// Unwrapped angle, counts from angle zero.
-    counts: i32,
-    /// What is added to it, rad.
-    correction_rad: f32,
-    angle_rad: f32,
-    rate_rad_s: f32,
-    /// Measured less expected angle at the last tick, rad.
-    innovation_rad: f32,
-}
-
-impl TrackingLoop {
-    /// Predicts over a time (s) with this acceleration (rad/s²).
-    #[inline(always)]
-    fn predict(&mut self, acceleration_rad_s2: f32, time_s: f32) {
-        let before = self.rate_rad_s;
-        self.rate_rad_s += acceleration_rad_s2 * time_s;
-        self.angle_rad += 0.5 * (before + self.rate_rad_s) * time_s;
-    }
-}
-
-/// Estimator of both joints' angles q' = (θ1, θ2 − θ1) and rates, with its gains.
+/// Estimator of both joints' angles q' = (θ1, θ2 − θ1) and rates, with its gains. The encoders have the same resolution.
 #[derive(Clone, Debug)]
 pub struct JointEstimator {
+    settings: JointEstimatorSettings,
     scales: [EncoderScale; 2],
-    rad_per_count: [f32; 2],
-    counts_per_rad: Vector2<f32>,
+    /// One count of an encoder, rad.
+    pub(super) rad_per_count: f32,
     /// Innovation in counts that an acceleration of 1 rad/s² causes if it is not fed forward.
-    lag_counts_s2: Vector2<f32>,
-    jump_counts: [i32; 2],
-    rate_limit_rad_s: f32,
+    lag_counts_s2: f32,
+    /// Largest count by which a joint can move in a tick.
+    jump_counts: u32,
     tick_s: f32,
     angle_gain: f32,
     rate_gain_per_s: f32,
-    compliance_rad_nm: [f32; 2],
-    corrector: EncoderCorrector,
-    /// Whether there have been readings; until then, all estimates are zero.
-    started: bool,
-    joints: [TrackingLoop; 2],
-    moved: bool,
-    /// Ticks predicted since the last readings, and the largest counts by which the joints can move in them.
+    /// The last readings; absent before the first, and until then all estimates are zero.
+    readings: Option<[EncoderCounts; 2]>,
+    /// Unwrapped angles, counts from angle zero.
+    counts: [i32; 2],
+    /// What is added to the encoders' angles, rad.
+    correction_rad: JointMotion<f32>,
+    /// Joint angles q', rad.
+    pub(super) angles_rad: JointMotion<f32>,
+    rates_rad_s: JointMotion<f32>,
+    /// Measured less expected angles at the last tick, rad.
+    innovation_rad: JointMotion<f32>,
+    /// Whether the last readings differed from the previous ones.
+    pub(super) moved: bool,
+    /// Ticks predicted since the last readings.
     predicted_ticks: u32,
-    most_counts: [i32; 2],
 }
 
 impl JointEstimator {
@@ -103,27 +86,27 @@ impl JointEstimator {
     pub fn new(settings: &JointEstimatorSettings, scales: [EncoderScale; 2], tick_hz: f32) -> Self {
         let tick_s = 1.0 / tick_hz;
         let pole = libm::expf(-settings.bandwidth_rad_s * tick_s);
-        let rad_per_count = scales.map(|scale| scale.rad_per_count::<f32>());
+        let rad_per_count: f32 = scales[0].rad_per_count();
         let rate_gain_per_s = (1.0 - pole) * (1.0 - pole) * tick_hz;
+        let most_counts = settings.rate_limit_rad_s * tick_s / rad_per_count;
         Self {
+            settings: *settings,
             scales,
             rad_per_count,
-            counts_per_rad: rad_per_count.map(f32::recip).into(),
-            lag_counts_s2: Vector2::from(rad_per_count.map(|lsb| tick_s / rate_gain_per_s / lsb)),
+            lag_counts_s2: tick_s / rate_gain_per_s / rad_per_count,
             // One count beyond the limit allows for the rounding of two readings.
-            jump_counts: rad_per_count
-                .map(|lsb| ((settings.rate_limit_rad_s * tick_s / lsb) as i32).saturating_add(2)),
-            rate_limit_rad_s: settings.rate_limit_rad_s,
+            jump_counts: (most_counts as u32).saturating_add(2),
             tick_s,
             angle_gain: 1.0 - pole * pole,
             rate_gain_per_s,
-            compliance_rad_nm: settings.gear_compliance_rad_nm,
-            corrector: EncoderCorrector::new(&settings.encoders),
-            started: false,
-            joints: [TrackingLoop::default(); 2],
+            readings: None,
+            counts: [0; 2],
+            correction_rad: JointMotion::zeros(),
+            angles_rad: JointMotion::zeros(),
+            rates_rad_s: JointMotion::zeros(),
+            innovation_rad: JointMotion::zeros(),
             moved: false,
             predicted_ticks: 0,
-            most_counts: [0; 2],
         }
     }
 
@@ -151,74 +134,52 @@ impl JointEstimator {
         acceleration_rad_s2: &JointMotion<f32>,
         torque_nm: &JointTorque<f32>,
     ) -> Result<(), Restart> {
-        if !self.started {
+        let Some(before) = self.readings.replace(*readings) else {
             self.start(readings);
             return Err(Restart::FirstReadings);
-        }
-        let [joint_1, joint_2] = &self.joints;
-        let [scale_1, scale_2] = &self.scales;
-        let [reading_1, reading_2] = *readings;
-        let moved_1 = scale_1.difference(joint_1.reading, reading_1);
-        let moved_2 = scale_2.difference(joint_2.reading, reading_2);
+        };
         if elapsed_ticks > self.predicted_ticks {
             self.bridge(acceleration_rad_s2, elapsed_ticks);
         }
-        let [most_1, most_2] = self.most_counts;
-        if moved_1.abs() > most_1 || moved_2.abs() > most_2 {
+        let moved = [0, 1].map(|i| self.scales[i].difference(before[i], readings[i]));
+        let most = self.jump_counts.saturating_mul(self.predicted_ticks);
+        if moved.iter().any(|counts| counts.unsigned_abs() > most) {
             self.start(readings);
             return Err(Restart::EncoderJump);
         }
-        self.forget_prediction();
-        self.moved = moved_1 != 0 || moved_2 != 0;
-        let [joint_1, joint_2] = &mut self.joints;
-        let follow = |joint: &mut TrackingLoop, reading, moved: i32, lsb: f32, twist_rad: f32| {
-            joint.reading = reading;
-            joint.counts = joint.counts.wrapping_add(moved);
-            let measured_rad = joint.counts as f32 * lsb + joint.correction_rad - twist_rad;
-            let innovation = measured_rad - joint.angle_rad;
-            joint.angle_rad += self.angle_gain * innovation;
-            joint.rate_rad_s += self.rate_gain_per_s * innovation;
-            joint.innovation_rad = innovation;
-        };
-        let [lsb_1, lsb_2] = self.rad_per_count;
-        let [soft_1, soft_2] = self.compliance_rad_nm;
-        follow(
-            joint_1,
-            reading_1,
-            moved_1,
-            lsb_1,
-            soft_1 * torque_nm.first(),
-        );
-        follow(
-            joint_2,
-            reading_2,
-            moved_2,
-            lsb_2,
-            soft_2 * torque_nm.second(),
-        );
+        self.predicted_ticks = 0;
+        self.moved = moved != [0; 2];
+        self.counts = [0, 1].map(|i| self.counts[i].wrapping_add(moved[i]));
+        let [soft_1, soft_2] = self.settings.gear_compliance_rad_nm;
+        let twist_rad = JointMotion::new(soft_1 * torque_nm.first(), soft_2 * torque_nm.second());
+        let measured_rad = self.encoders_rad() + self.correction_rad - twist_rad;
+        self.innovation_rad = measured_rad - self.angles_rad;
+        self.angles_rad += self.innovation_rad * self.angle_gain;
+        self.rates_rad_s += self.innovation_rad * self.rate_gain_per_s;
         Ok(())
+    }
+
+    /// Returns the angles that the encoders show, rad.
+    #[inline]
+    fn encoders_rad(&self) -> JointMotion<f32> {
+        JointMotion::from_array(self.counts.map(|counts| counts as f32 * self.rad_per_count))
     }
 
     /// Predicts angles and rates at the next tick, given the expected acceleration of q' (rad/s²) until then.
     #[inline]
     pub fn predict(&mut self, acceleration_rad_s2: &JointMotion<f32>) {
-        let limit = self.rate_limit_rad_s;
-        for joint in &mut self.joints {
-            joint.rate_rad_s = joint.rate_rad_s.within(limit);
-        }
+        let limit = self.settings.rate_limit_rad_s;
+        self.rates_rad_s = self.rates_rad_s.map(|rate| rate.within(limit));
         self.predict_over(acceleration_rad_s2, 1);
     }
 
     #[inline(always)]
-    fn predict_over(&mut self, acceleration_rad_s2: &JointMotion<f32>, ticks: i32) {
+    fn predict_over(&mut self, acceleration_rad_s2: &JointMotion<f32>, ticks: u32) {
         let time_s = ticks as f32 * self.tick_s;
-        self.predicted_ticks = self.predicted_ticks.saturating_add(ticks as u32);
-        for (most, jump) in self.most_counts.iter_mut().zip(self.jump_counts) {
-            *most = most.saturating_add(jump.saturating_mul(ticks));
-        }
-        let [joint_1, joint_2] = &mut self.joints;
-        joint_1.predict(acceleration_rad_s2.first(), time_s);
-        joint_2.predict(acceleration_rad_s2.second(), time_s);
+        self.predicted_ticks = self.predicted_ticks.saturating_add(ticks);
+        let before = self.rates_rad_s;
+        self.rates_rad_s += *acceleration_rad_s2 * time_s;
+        self.angles_rad += (before + self.rates_rad_s) * 0.5 * time_s;
     }
 
     /// Predicts the ticks of frames that have not arrived.
@@ -226,99 +187,53 @@ impl JointEstimator {
     #[inline(never)]
     fn bridge(&mut self, acceleration_rad_s2: &JointMotion<f32>, elapsed_ticks: u32) {
         let ticks = (elapsed_ticks - self.predicted_ticks).min(MOST_LOST_TICKS);
-        self.predict_over(acceleration_rad_s2, ticks as i32);
+        self.predict_over(acceleration_rad_s2, ticks);
     }
 
     /// Corrects the next readings, which are expected near this pose.
     #[inline]
     pub fn expect_pose(&mut self, pose: &Pose<f32>) {
-        if let Some(corrections_rad) = self.corrector.in_pose(pose) {
-            let [joint_1, joint_2] = &mut self.joints;
-            joint_1.correction_rad = corrections_rad.first();
-            joint_2.correction_rad = corrections_rad.second();
-        }
-    }
-
-    fn forget_prediction(&mut self) {
-        self.predicted_ticks = 0;
-        self.most_counts = [0; 2];
+        self.correction_rad = self.settings.encoders.in_pose(pose);
     }
 
     /// Restarts both loops from these readings, at rest.
     fn start(&mut self, readings: &[EncoderCounts; 2]) {
-        self.started = true;
         self.moved = true;
-        self.forget_prediction();
-        let [scale_1, scale_2] = &self.scales;
-        let [reading_1, reading_2] = *readings;
-        let counts = [
-            scale_1.counts_from_zero(reading_1),
-            scale_2.counts_from_zero(reading_2),
-        ];
-        let angles_rad = [0, 1].map(|joint| counts[joint] as f32 * self.rad_per_count[joint]);
-        let corrections_rad = self.corrector.at(angles_rad);
-        for (joint, tracking) in self.joints.iter_mut().enumerate() {
-            *tracking = TrackingLoop {
-                reading: readings[joint],
-                counts: counts[joint],
-                correction_rad: corrections_rad[joint],
-                angle_rad: angles_rad[joint] + corrections_rad[joint],
-                ..Default::default()
-            };
-        }
+        self.predicted_ticks = 0;
+        self.counts = [0, 1].map(|i| self.scales[i].counts_from_zero(readings[i]));
+        let encoders_rad = self.encoders_rad();
+        // A zero may be off by some degrees, and changes the rest of the correction; that changes itself by little.
+        let near_rad = encoders_rad + JointMotion::from_array(self.settings.encoders.zero_rad);
+        self.expect_pose(&Pose::new(&near_rad.to_links()));
+        self.angles_rad = encoders_rad + self.correction_rad;
+        self.rates_rad_s = JointMotion::zeros();
+        self.innovation_rad = JointMotion::zeros();
     }
 
     /// Returns the measured minus the expected joint angles q' at the last tick, counts.
     pub fn innovation_counts(&self) -> Vector2<f32> {
-        let [one, two] = &self.joints;
-        Vector2::new(one.innovation_rad, two.innovation_rad).component_mul(&self.counts_per_rad)
+        self.innovation_rad.vector() * (1.0 / self.rad_per_count)
     }
 
     /// Returns the steady innovation, counts, that an acceleration of q' (rad/s²) causes if it is
     /// not fed forward: q̈' T²/(1 − z)².
     pub fn lag_counts(&self, acceleration_rad_s2: &JointMotion<f32>) -> Vector2<f32> {
-        acceleration_rad_s2
-            .vector()
-            .component_mul(&self.lag_counts_s2)
+        acceleration_rad_s2.vector() * self.lag_counts_s2
     }
 
-    /// Returns the fraction of the innovation that remains after a tick: measured minus estimated
-    /// angles.
-    pub fn residual_share(&self) -> f32 {
-        1.0 - self.angle_gain
-    }
-
-    /// One count of each encoder, rad.
-    pub fn count_rad(&self) -> Vector2<f32> {
-        self.rad_per_count.into()
-    }
-
-    /// Returns the joint angles q', rad.
-    pub fn angles_rad(&self) -> JointMotion<f32> {
-        let [one, two] = &self.joints;
-        JointMotion::new(one.angle_rad, two.angle_rad)
+    /// Returns the measured minus the estimated link angles after the last tick's correction, rad.
+    pub fn residual_rad(&self) -> LinkMotion<f32> {
+        self.innovation_rad.to_links() * (1.0 - self.angle_gain)
     }
 
     /// Returns the link angles θ = (θ1, θ2), rad; zero before the first readings.
     pub fn theta_rad(&self) -> LinkMotion<f32> {
-        self.angles_rad().to_links()
-    }
-
-    /// Returns the measured minus the expected link angles at the last tick, rad.
-    pub fn innovation_rad(&self) -> LinkMotion<f32> {
-        let [one, two] = &self.joints;
-        JointMotion::new(one.innovation_rad, two.innovation_rad).to_links()
-    }
-
-    /// Returns whether the last readings differed from the previous ones.
-    pub fn has_moved(&self) -> bool {
-        self.moved
+        self.angles_rad.to_links()
     }
 
     /// Returns the link rates θ̇, rad/s; zero before the second readings.
     pub fn theta_dot_rad_s(&self) -> LinkMotion<f32> {
-        let [one, two] = &self.joints;
-        JointMotion::new(one.rate_rad_s, two.rate_rad_s).to_links()
+        self.rates_rad_s.to_links()
     }
 }
 

@@ -23,34 +23,25 @@ pub mod model;
 pub mod response;
 
 use nalgebra::Vector2;
-use painleve_shared::counts::{EncoderScale, LinearConverter, LinearScale};
+use painleve_shared::counts::LinearConverter;
 use painleve_shared::frame::SensorFrame;
 use painleve_shared::{Arm, JointTorque, Pose, Slip};
 
-use self::belt::{BeltEstimator, BeltSpeedSettings};
-use self::calibration::{CalibrationSettings, LengthCalibrator};
-use self::contact::{ContactDetector, ContactSettings, Evidence};
+use self::belt::BeltEstimator;
+use self::calibration::LengthCalibrator;
+use self::contact::{ContactDetector, Evidence};
 pub use self::contact_estimate::ContactEstimate;
-use self::disturbance::{DisturbanceEstimator, DisturbanceSettings};
-use self::friction::{FrictionEstimator, FrictionSettings};
+use self::disturbance::DisturbanceEstimator;
+use self::friction::FrictionEstimator;
 use self::joint_friction::JointFriction;
-use self::joints::{JointEstimator, JointEstimatorSettings, Restart};
+use self::joints::{JointEstimator, Restart};
 use self::model::Model;
-use self::response::{ForceReading, ResponseEstimator, ResponseSettings};
+use self::response::ResponseEstimator;
 use crate::last_command::LastCommand;
 use crate::schedule::Turn;
 
 /// Least velocity by which a sticking tip falls behind its reference, m/s.
 const DRAGGED_M_S: f32 = 0.02;
-
-/// What a tick in contact offers to the slow estimates.
-#[derive(Clone, Copy, Debug)]
-pub struct SlowReadings {
-    /// Whether the gap shows the links' length: the tip certainly touches, and has moved.
-    pub shows_length: bool,
-    /// Whether a block of the response's readings is complete.
-    pub completes_block: bool,
-}
 
 /// What the update after a tick needs of it besides the estimates.
 #[derive(Clone, Copy, Debug, Default)]
@@ -67,35 +58,6 @@ pub struct Observed {
     pub saturated: bool,
 }
 
-/// Settings of all estimators, and the scalings of their readings.
-#[derive(Clone, Copy, Debug)]
-pub struct EstimateSettings<'a> {
-    /// Control rate, Hz.
-    pub tick_hz: f32,
-    /// Scalings of the encoders of θ1 and of θ2 − θ1.
-    pub encoders: [EncoderScale; 2],
-    /// Scaling of the force cell.
-    pub force: LinearScale<f32>,
-    /// Largest torque on either joint, N·m.
-    pub torque_limit_nm: f32,
-    /// Coulomb friction of the joints, N·m.
-    pub coulomb_friction_nm: [f32; 2],
-    /// Tracking loops of the joints.
-    pub joints: JointEstimatorSettings,
-    /// Contact decision.
-    pub contact: &'a ContactSettings,
-    /// Friction.
-    pub friction: &'a FrictionSettings,
-    /// Bounds of the belt's speed.
-    pub belt: &'a BeltSpeedSettings,
-    /// Response of the contact.
-    pub response: &'a ResponseSettings,
-    /// Unknown torques.
-    pub disturbance: &'a DisturbanceSettings,
-    /// Calibration of the links' length.
-    pub calibration: &'a CalibrationSettings,
-}
-
 /// All estimators of one arm, and what they know of it.
 #[derive(Clone, Debug)]
 #[repr(C)]
@@ -106,61 +68,21 @@ pub struct Estimators {
     pub model: Model,
     /// The arm with its calibrated length.
     pub arm: Arm<f32>,
-    joints: JointEstimator,
-    decision: ContactDetector,
-    friction: FrictionEstimator,
-    belt: BeltEstimator,
-    response: ResponseEstimator,
-    disturbance: DisturbanceEstimator,
-    calibrator: LengthCalibrator,
-    joint_friction: JointFriction,
-    force_cell: LinearConverter<f32>,
+    pub(crate) joints: JointEstimator,
+    pub(crate) decision: ContactDetector,
+    pub(crate) friction: FrictionEstimator,
+    pub(crate) belt: BeltEstimator,
+    pub(crate) response: ResponseEstimator,
+    pub(crate) disturbance: DisturbanceEstimator,
+    pub(crate) calibrator: LengthCalibrator,
+    pub(crate) joint_friction: JointFriction,
+    pub(crate) force_cell: LinearConverter<f32>,
     /// Largest reading of the force cell, N.
-    force_range_n: f32,
-    tick_s: f32,
+    pub(crate) force_range_n: f32,
+    pub(crate) tick_s: f32,
 }
 
 impl Estimators {
-    /// Makes the estimators with these settings, without readings of this arm.
-    pub fn new(settings: &EstimateSettings<'_>, arm: Arm<f32>) -> Self {
-        let tick_s = 1.0 / settings.tick_hz;
-        let slow_period_s = Turn::COUNT * tick_s;
-        let force_cell = settings.force.converter();
-        let [link_length_m, _] = arm.link_length_m();
-        let friction = FrictionEstimator::new(settings.friction, settings.contact, tick_s);
-        let response = ResponseEstimator::new(settings.response, tick_s);
-        let contact = ContactEstimate {
-            friction: *friction.estimate(),
-            response: response.response(0.0, 0.0),
-            ..Default::default()
-        };
-        Self {
-            contact,
-            model: Model::default(),
-            arm,
-            force_cell,
-            force_range_n: force_cell.value(force_cell.maximum_counts),
-            tick_s,
-            joints: JointEstimator::new(&settings.joints, settings.encoders, settings.tick_hz),
-            decision: ContactDetector::new(settings.contact),
-            friction,
-            belt: BeltEstimator::new(settings.belt, tick_s),
-            response,
-            disturbance: DisturbanceEstimator::new(
-                settings.disturbance,
-                settings.torque_limit_nm,
-                slow_period_s,
-            ),
-            calibrator: LengthCalibrator::new(settings.calibration, link_length_m, slow_period_s),
-            joint_friction: JointFriction::new(settings.coulomb_friction_nm),
-        }
-    }
-
-    /// Returns the certainty of the decision about contact, 0 … 1.
-    pub fn contact_confidence(&self) -> f32 {
-        self.decision.confidence()
-    }
-
     /// Returns whether the encoders, and whether the force cell, can give a frame's readings.
     #[inline]
     pub fn readable(&self, frame: &SensorFrame) -> (bool, bool) {
@@ -193,9 +115,7 @@ impl Estimators {
                 self.model.move_to(&self.arm, theta_rad, theta_dot_rad_s);
                 if !self.joint_friction.is_zero() {
                     // It follows the travel between readings, which the prediction does not show.
-                    let angles_rad = self.joints.angles_rad();
-                    let change_nm = self.joint_friction.tick(&angles_rad);
-                    self.model.add_friction_nm(&change_nm);
+                    self.model.bias_nm += self.joint_friction.tick(&self.joints.angles_rad);
                 }
             }
             // Nothing has been predicted for these readings.
@@ -207,7 +127,6 @@ impl Estimators {
             self.force_cell.value(frame.tangential_force.0),
             self.force_cell.value(frame.normal_force.0),
         );
-        let touched = self.decision.touches();
         let touches = match self.decision.evidence() {
             Evidence::ForceCell => self.decision.update_from_force(force_n.y),
             Evidence::Encoders => {
@@ -216,12 +135,13 @@ impl Estimators {
                 self.decision.update_from_encoders(&encoders)
             }
         };
-        let contact = &mut self.contact;
-        contact.touches = touches;
+        let (contact, range_n) = (&mut self.contact, self.force_range_n);
+        let touched = core::mem::replace(&mut contact.touches, touches);
         contact.lands = touches && !touched;
         contact.leaves = touched && !touches;
         contact.in_flight = self.decision.is_in_flight();
         contact.force_n = force_n;
+        contact.in_range = force_n.x.abs() < range_n && force_n.y.abs() < range_n;
         self.correct_friction(last.reference_velocity_m_s);
         followed
     }
@@ -232,14 +152,13 @@ impl Estimators {
         if !self.contact.touches {
             return;
         }
-        let force_n = self.contact.force_n;
-        if self.is_in_range(&force_n) {
+        if self.contact.in_range {
             let tip_velocity_m_s = self.model.tip_velocity_m_s.x;
             let is_dragged = |slip: Slip| {
                 let lag_m_s = reference_velocity_m_s - tip_velocity_m_s;
                 slip.sign::<f32>() * lag_m_s > DRAGGED_M_S && self.belt.may_stick(tip_velocity_m_s)
             };
-            self.friction.correct(&force_n, is_dragged);
+            self.friction.correct(&self.contact.force_n, is_dragged);
         }
         let contact = &mut self.contact;
         contact.friction = *self.friction.estimate();
@@ -248,21 +167,14 @@ impl Estimators {
             .p_per_kg(contact.friction.coefficient, contact.friction.slip);
     }
 
-    /// Returns whether the force cell is not at the end of its range, where it reads less than the actual force.
+    /// Updates friction, belt and response of a contact with the force at the last tick, and what has this turn. Returns
+    /// whether the turn of the edges is free for them.
     #[inline]
-    fn is_in_range(&self, force_n: &Vector2<f32>) -> bool {
-        let range_n = self.force_range_n;
-        force_n.x.abs() < range_n && force_n.y.abs() < range_n
-    }
-
-    /// Updates friction, belt and response of a contact with the force at the last tick.
-    #[inline]
-    pub fn learn_in_contact(&mut self, observed: &Observed) -> SlowReadings {
+    pub fn learn_in_contact(&mut self, observed: &Observed, turn: Turn) -> bool {
         let is_informative = self.add_to_balance(observed);
         let (model, contact) = (&self.model, &self.contact);
-        let force_n = contact.force_n;
-        if self.is_in_range(&force_n) {
-            self.friction.update(&force_n);
+        if contact.in_range {
+            self.friction.update(&contact.force_n);
         }
         let friction = self.friction.estimate();
         self.belt.update(model.tip_velocity_m_s.x, Some(friction));
@@ -271,24 +183,33 @@ impl Estimators {
         let mut completes_block = false;
         if is_informative && slides && !observed.saturated && self.response.is_enabled() {
             let slope = &model.free_slope_per_kg_m;
-            let reading = ForceReading {
-                normal_force_n: force_n.y,
-                withheld_n: observed.rounding_nm.vector().dot(slope) / p_per_kg,
-            };
-            completes_block = self.response.update(&reading);
+            let withheld_n = observed.rounding_nm.vector().dot(slope) / p_per_kg;
+            completes_block = self.response.update(contact.force_n.y, withheld_n);
         } else {
             self.response.pause();
         }
-        SlowReadings {
-            // An unchanged reading would gain weight merely with time.
-            shows_length: self.decision.is_certain() && self.joints.has_moved(),
-            completes_block,
+        match turn {
+            Turn::Balance => {
+                self.balance_torques();
+                // The gap of a tip that certainly touches shows the links' length. An unchanged reading would gain weight
+                // merely with time.
+                if self.decision.is_certain() && self.joints.moved {
+                    let gap_m = self.gap_m();
+                    self.calibrator.update(&mut self.arm, gap_m);
+                }
+                false
+            }
+            Turn::Edges if completes_block => {
+                self.response.evaluate();
+                false
+            }
+            Turn::Edges => true,
         }
     }
 
-    /// Updates friction and belt at a tick without contact.
+    /// Updates friction and belt at a tick without contact, and what has this turn.
     #[inline]
-    pub fn learn_in_the_air(&mut self, observed: &Observed) {
+    pub fn learn_in_the_air(&mut self, observed: &Observed, turn: Turn) {
         if self.contact.leaves {
             self.friction.doubt();
         }
@@ -296,19 +217,21 @@ impl Estimators {
         self.belt.update(tip_velocity_m_s, None);
         self.response.pause();
         self.add_to_balance(observed);
+        if turn == Turn::Balance {
+            self.balance_torques();
+        }
     }
 
     /// Adds a tick to the next update of the disturbance; returns whether force and torque show what the model does
     /// not explain.
     #[inline]
     fn add_to_balance(&mut self, observed: &Observed) -> bool {
-        let force_n = &self.contact.force_n;
-        let is_informative =
-            self.decision.is_certain() && self.is_in_range(force_n) && observed.drove;
+        let contact = &self.contact;
+        let is_informative = self.decision.is_certain() && contact.in_range && observed.drove;
         if is_informative {
             let elapsed_s = observed.elapsed_ticks as f32 * self.tick_s;
             self.disturbance
-                .add(&observed.torque_nm, force_n, elapsed_s);
+                .add(&observed.torque_nm, &contact.force_n, elapsed_s);
         } else {
             self.disturbance.pause();
         }
@@ -359,23 +282,10 @@ impl Estimators {
         contact.response = response;
     }
 
-    /// Evaluates the response of the contact with a complete block of readings.
-    #[inline]
-    pub fn evaluate_response(&mut self) {
-        self.response.evaluate();
-    }
-
-    /// Updates the calibration with a gap that shows the links' length.
-    #[inline]
-    pub fn calibrate(&mut self) {
-        let gap_m = self.gap_m();
-        self.calibrator.update(&mut self.arm, gap_m);
-    }
-
     /// Updates the disturbance.
     // Out of line: contact and flight both contain it.
     #[inline(never)]
-    pub fn balance_torques(&mut self) {
+    fn balance_torques(&mut self) {
         let contact = &self.contact;
         let p_ratio = contact.touches.then_some(contact.p_ratio);
         let loop_share = contact.response.loop_share;

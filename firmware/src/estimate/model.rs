@@ -29,8 +29,8 @@ pub struct Model {
     mobility: Matrix2<f32>,
     /// ∂w/∂θ, N·m/rad.
     stiffness_nm_rad: Matrix2<f32>,
-    /// w + c − d, N·m.
-    bias_nm: GeneralisedTorque<f32>,
+    /// w + c − d with the friction of the joints, N·m.
+    pub(super) bias_nm: GeneralisedTorque<f32>,
     /// Centrifugal torque on link 2 for each rad²/s² of link 1, and on link 1 against that of link 2, N·m·s².
     centrifugal_nms2: f32,
     /// Centripetal acceleration s of the tip, m/s².
@@ -48,19 +48,8 @@ pub struct Model {
 }
 
 impl Model {
-    /// Evaluates the terms at link angles θ (rad) and rates θ̇ (rad/s), with an additional
+    /// Evaluates the terms at link angles θ (rad), whose pose is given, and rates θ̇ (rad/s), with an additional
     /// generalised torque d (N·m) on the arm.
-    pub fn new(
-        arm: &Arm<f32>,
-        theta_rad: LinkMotion<f32>,
-        theta_dot_rad_s: LinkMotion<f32>,
-        disturbance_nm: &GeneralisedTorque<f32>,
-    ) -> Self {
-        let pose = Pose::new(&theta_rad);
-        Self::in_pose(arm, &pose, theta_rad, theta_dot_rad_s, disturbance_nm)
-    }
-
-    /// The same with the pose of these link angles.
     #[inline]
     pub fn in_pose(
         arm: &Arm<f32>,
@@ -78,10 +67,9 @@ impl Model {
             sine_elbow.at_least(STRAIGHT_ARM_SINE)
         };
         let [length_1, length_2] = arm.link_length_m();
-        let normal = Vector2::new(jacobian.m21, jacobian.m22);
-        let normal_mobility = mobility * normal;
-        let tangential = Vector2::new(jacobian.m11, jacobian.m12);
-        let tangential_mobility = mobility * tangential;
+        // Accelerations of the links by each component of the contact force.
+        let response = mobility * jacobian.transpose();
+        let q = jacobian * response;
         let tip_m = arm.tip_m(pose);
         let bias_nm = arm.passive_torque_nm(&theta_rad, &theta_dot_rad_s, pose)
             + arm.centrifugal_torque_nm(&theta_dot_rad_s, pose)
@@ -102,14 +90,23 @@ impl Model {
             centripetal_m_s2,
             // det J = l1 l2 sin(θ2 − θ1).
             inverse_determinant_per_m2: 1.0 / (length_1 * length_2 * bounded),
-            free_slope_per_kg_m: Vector2::new(
-                normal_mobility.x,
-                normal_mobility.y - normal_mobility.x,
-            ),
-            q11_per_kg: tangential_mobility.dot(&tangential),
-            q12_per_kg: tangential_mobility.dot(&normal),
-            q22_per_kg: normal_mobility.dot(&normal),
+            free_slope_per_kg_m: Vector2::new(response.m12, response.m22 - response.m12),
+            q11_per_kg: q.m11,
+            q12_per_kg: q.m21,
+            q22_per_kg: q.m22,
         }
+    }
+
+    /// The same without the pose.
+    #[cfg(test)]
+    pub fn new(
+        arm: &Arm<f32>,
+        theta_rad: LinkMotion<f32>,
+        theta_dot_rad_s: LinkMotion<f32>,
+        disturbance_nm: &GeneralisedTorque<f32>,
+    ) -> Self {
+        let pose = Pose::new(&theta_rad);
+        Self::in_pose(arm, &pose, theta_rad, theta_dot_rad_s, disturbance_nm)
     }
 
     /// Moves the model to these link angles θ (rad) and rates θ̇ (rad/s) nearby, to first order: everything that the inverse
@@ -159,12 +156,6 @@ impl Model {
         self.bias_nm += GeneralisedTorque::from_vector(self.stiffness_nm_rad * turned.vector());
         self.theta_rad = theta_rad;
         self.theta_dot_rad_s = theta_dot_rad_s;
-    }
-
-    /// Adds friction of the joints, positive against a positive rate, as a torque on the links, N·m.
-    #[inline]
-    pub fn add_friction_nm(&mut self, torque_nm: &GeneralisedTorque<f32>) {
-        self.bias_nm += *torque_nm;
     }
 
     /// Returns the link acceleration θ̈ = J⁻¹ (z̈ − s), rad/s², for a tip acceleration z̈ (m/s²).

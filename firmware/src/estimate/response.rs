@@ -54,15 +54,6 @@ const LEAST_REST: f32 = 0.05;
 /// Time in contact before the correlation starts, s.
 const SETTLING_S: f32 = 0.05;
 
-/// Inputs of one tick in which the tip slides in contact.
-#[derive(Clone, Copy, Debug)]
-pub struct ForceReading {
-    /// Measured normal force, N.
-    pub normal_force_n: f32,
-    /// Normal force that the torque withheld by rounding would cause on a rigid contact, N.
-    pub withheld_n: f32,
-}
-
 /// What the response allows.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ContactResponse {
@@ -80,6 +71,7 @@ pub struct ContactResponse {
 
 impl ContactResponse {
     /// The response of a rigid contact at this p/Q22.
+    #[cfg(test)]
     pub fn rigid(p_ratio: f32) -> Self {
         Self {
             loop_share: EACH_LOOP * p_ratio.at_least(0.0),
@@ -200,7 +192,7 @@ impl ResponseEstimator {
             block_weight: 1.0,
             lower: 0.0,
             upper: 1.0,
-            gain: 0.0,
+            gain: if settings.enabled { 0.0 } else { 1.0 },
             give: 0.0,
             lags: 0.0,
             touched_s: 0.0,
@@ -215,9 +207,6 @@ impl ResponseEstimator {
     /// Returns what the response allows where p is `p_per_kg` and `p_ratio` of Q22.
     #[inline]
     pub fn response(&self, p_per_kg: f32, p_ratio: f32) -> ContactResponse {
-        if !self.settings.enabled {
-            return ContactResponse::rigid(p_ratio);
-        }
         let gain = self.gain.at_least(self.least_share_kg * p_per_kg);
         let share = gain * p_ratio / (1.0 - p_ratio).at_least(LEAST_REST);
         ContactResponse {
@@ -229,19 +218,20 @@ impl ResponseEstimator {
     }
 
     /// Adds one tick of a tip that slides in contact to the present block, and returns whether the block is
-    /// complete: [`evaluate`](Self::evaluate) is then due, twice, when there is time.
+    /// complete: [`evaluate`](Self::evaluate) is then due, twice, when there is time. `normal_force_n` is the measured
+    /// force (N), `withheld_n` the one that the torque withheld by rounding would cause on a rigid contact (N).
     #[inline]
-    pub fn update(&mut self, reading: &ForceReading) -> bool {
-        let excitation_n = reading.withheld_n - self.withheld_n + self.acting_probe_n;
+    pub fn update(&mut self, normal_force_n: f32, withheld_n: f32) -> bool {
+        let excitation_n = withheld_n - self.withheld_n + self.acting_probe_n;
         let expected_n = excitation_n - self.excitation_n;
-        self.withheld_n = reading.withheld_n;
+        self.withheld_n = withheld_n;
         self.excitation_n = excitation_n;
         let [e1, e2, e3, _] = self.expected_n;
         let e0 = expected_n;
         self.expected_n = [e0, e1, e2, e3];
-        let change_n = reading.normal_force_n - self.force_n;
+        let change_n = normal_force_n - self.force_n;
         let change_of_change_n = change_n - self.change_n;
-        self.force_n = reading.normal_force_n;
+        self.force_n = normal_force_n;
         self.change_n = change_n;
         self.touched_s += self.tick_s;
         self.acting_probe_n = self.probe_n;

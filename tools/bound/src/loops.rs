@@ -101,7 +101,6 @@ impl Limits {
                 "four lapses that a board reports",
             ),
             declare("plausibility::", Limit::Times(2), "two joints"),
-            declare("EncoderCorrector::at", Limit::Times(2), "two joints"),
             declare(
                 "div_rem",
                 Limit::Times(64),

@@ -18,11 +18,8 @@ fn observed(ticks: u32, mut contact: impl FnMut(f32) -> f32) -> ContactResponse 
     // The probe of a tick is drawn after the tick before.
     let (mut withheld, mut probe_n, mut commanded) = (0.0, 0.0, 10.0);
     for tick in 0..ticks {
-        let reading = ForceReading {
-            normal_force_n: contact(commanded) + 0.03 * noise(3 * tick),
-            withheld_n: withheld,
-        };
-        if estimator.update(&reading) && tick % 2 == 0 {
+        let force_n = contact(commanded) + 0.03 * noise(3 * tick);
+        if estimator.update(force_n, withheld) && tick % 2 == 0 {
             estimator.evaluate();
         }
         let next = 0.05 * noise(3 * tick + 1);
@@ -106,14 +103,10 @@ fn ticks_until(
     estimator: &mut ResponseEstimator,
     is_there: impl Fn(&ResponseEstimator) -> bool,
 ) -> u8 {
-    let reading = ForceReading {
-        normal_force_n: 10.0,
-        withheld_n: 0.0,
-    };
     let mut ticks = 0;
     loop {
         ticks += 1;
-        if estimator.update(&reading) && ticks % 2 == 0 {
+        if estimator.update(10.0, 0.0) && ticks % 2 == 0 {
             estimator.evaluate();
         }
         if is_there(estimator) {
