@@ -58,7 +58,6 @@ impl<L: Law> Stages<L> {
             ..settings.estimator
         };
         let (tick_hz, tick_s) = (configuration.tick_hz, configuration.tick_s());
-        let turn_s = Turn::COUNT * tick_s;
         let (torque_limit_nm, [link_length_m, _]) = (settings.torque_limit_nm, arm.link_length_m());
         let force_cell = converters.force.converter();
         let estimates = Estimators {
@@ -70,12 +69,15 @@ impl<L: Law> Stages<L> {
             friction: FrictionEstimator::new(&settings.friction, &settings.contact, tick_s),
             belt: BeltEstimator::new(&settings.belt, tick_s),
             response: ResponseEstimator::new(&settings.response, tick_s),
-            disturbance: DisturbanceEstimator::new(&settings.disturbance, torque_limit_nm, turn_s),
-            calibrator: LengthCalibrator::new(&settings.calibration, link_length_m, turn_s),
+            disturbance: DisturbanceEstimator::new(&settings.disturbance, torque_limit_nm, tick_s),
+            calibrator: LengthCalibrator::new(
+                &settings.calibration,
+                link_length_m,
+                Turn::COUNT * tick_s,
+            ),
             joint_friction: JointFriction::new(configuration.arm.coulomb_friction_nm),
             force_cell,
             force_range_n: force_cell.value(force_cell.maximum_counts),
-            tick_s,
         };
         Self {
             estimates,

@@ -79,7 +79,6 @@ pub struct Estimators {
     pub(crate) force_cell: LinearConverter<f32>,
     /// Largest reading of the force cell, N.
     pub(crate) force_range_n: f32,
-    pub(crate) tick_s: f32,
 }
 
 impl Estimators {
@@ -184,7 +183,9 @@ impl Estimators {
         if is_informative && slides && !observed.saturated && self.response.is_enabled() {
             let slope = &model.free_slope_per_kg_m;
             let withheld_n = observed.rounding_nm.vector().dot(slope) / p_per_kg;
-            completes_block = self.response.update(contact.force_n.y, withheld_n);
+            completes_block =
+                self.response
+                    .update(contact.force_n.y, withheld_n, observed.elapsed_ticks);
         } else {
             self.response.pause();
         }
@@ -229,9 +230,9 @@ impl Estimators {
         let contact = &self.contact;
         let is_informative = self.decision.is_certain() && contact.in_range && observed.drove;
         if is_informative {
-            let elapsed_s = observed.elapsed_ticks as f32 * self.tick_s;
+            let (torque_nm, force_n) = (&observed.torque_nm, &contact.force_n);
             self.disturbance
-                .add(&observed.torque_nm, &contact.force_n, elapsed_s);
+                .add(torque_nm, force_n, observed.elapsed_ticks);
         } else {
             self.disturbance.pause();
         }

@@ -219,9 +219,15 @@ impl ResponseEstimator {
 
     /// Adds one tick of a tip that slides in contact to the present block, and returns whether the block is
     /// complete: [`evaluate`](Self::evaluate) is then due, twice, when there is time. `normal_force_n` is the measured
-    /// force (N), `withheld_n` the one that the torque withheld by rounding would cause on a rigid contact (N).
+    /// force (N), `withheld_n` the one that the torque withheld by rounding would cause on a rigid contact (N), and
+    /// `elapsed_ticks` the time since the previous readings.
     #[inline]
-    pub fn update(&mut self, normal_force_n: f32, withheld_n: f32) -> bool {
+    pub fn update(&mut self, normal_force_n: f32, withheld_n: f32, elapsed_ticks: u32) -> bool {
+        if elapsed_ticks > 1 {
+            // Forces before lost readings show nothing: skip the ticks with differences to them.
+            let skipped_s = (DELAYS as f32 + 1.5) * self.tick_s;
+            self.touched_s = self.touched_s.at_most(SETTLING_S - skipped_s);
+        }
         let excitation_n = withheld_n - self.withheld_n + self.acting_probe_n;
         let expected_n = excitation_n - self.excitation_n;
         self.withheld_n = withheld_n;
@@ -297,7 +303,7 @@ impl ResponseEstimator {
     /// Skips a tick without information: in the air, or with a reading in doubt.
     #[inline]
     pub fn pause(&mut self) {
-        if self.touched_s > 0.0 {
+        if self.touched_s != 0.0 {
             self.touched_s = 0.0;
             self.acting_probe_n = 0.0;
             self.probe_n = 0.0;

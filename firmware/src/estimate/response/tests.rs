@@ -13,13 +13,22 @@ fn estimator() -> ResponseEstimator {
 
 /// Returns the response after `ticks` of a contact that gives the force (N) in
 /// answer to the force commanded at the previous tick.
-fn observed(ticks: u32, mut contact: impl FnMut(f32) -> f32) -> ContactResponse {
+fn observed(ticks: u32, contact: impl FnMut(f32) -> f32) -> ContactResponse {
+    observed_after(|_| 1, ticks, contact)
+}
+
+/// The same with readings that follow the previous ones after these ticks.
+fn observed_after(
+    elapsed_ticks: impl Fn(u32) -> u32,
+    ticks: u32,
+    mut contact: impl FnMut(f32) -> f32,
+) -> ContactResponse {
     let mut estimator = estimator();
     // The probe of a tick is drawn after the tick before.
     let (mut withheld, mut probe_n, mut commanded) = (0.0, 0.0, 10.0);
     for tick in 0..ticks {
         let force_n = contact(commanded) + 0.03 * noise(3 * tick);
-        if estimator.update(force_n, withheld) && tick % 2 == 0 {
+        if estimator.update(force_n, withheld, elapsed_ticks(tick)) && tick % 2 == 0 {
             estimator.evaluate();
         }
         let next = 0.05 * noise(3 * tick + 1);
@@ -87,6 +96,19 @@ fn a_contact_certainly_lags_even_if_its_force_swings() {
     assert_eq!(swinging(1000, 3.0, |commanded| commanded).lags, 0.0);
 }
 
+/// The force changes for other reasons while no readings arrive, and by more than in a tick.
+#[test]
+fn a_rigid_contact_is_found_even_if_readings_are_lost() {
+    let mut tick = 0;
+    let elapsed_ticks = |tick| if tick % 10 == 0 { 3 } else { 1 };
+    let found = observed_after(elapsed_ticks, 1500, |commanded| {
+        let drift_n = noise(tick / 10);
+        tick += 1;
+        commanded + drift_n
+    });
+    assert_eq!(found, ContactResponse::rigid(P_RATIO));
+}
+
 #[test]
 fn all_is_allowed_if_it_is_off() {
     let settings = ResponseSettings {
@@ -106,7 +128,7 @@ fn ticks_until(
     let mut ticks = 0;
     loop {
         ticks += 1;
-        if estimator.update(10.0, 0.0) && ticks % 2 == 0 {
+        if estimator.update(10.0, 0.0, 1) && ticks % 2 == 0 {
             estimator.evaluate();
         }
         if is_there(estimator) {
