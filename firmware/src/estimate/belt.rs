@@ -10,7 +10,7 @@ use painleve_shared::{Real, Slip, settings};
 use crate::estimate::friction::FrictionEstimate;
 
 /// Error of the tip velocities that are bounds of the belt's speed, m/s.
-const BOUND_ERROR_M_S: f32 = 0.01;
+pub const BOUND_ERROR_M_S: f32 = 0.01;
 
 settings! {
     /// Settings of the belt-speed estimator.

@@ -35,12 +35,12 @@ pub struct LengthCalibrator {
 }
 
 impl LengthCalibrator {
-    /// Makes a calibrator of arms whose link 1 has the nominal length `nominal_m`, called every `tick_s`.
-    pub fn new(settings: &CalibrationSettings, nominal_m: f32, tick_s: f32) -> Self {
+    /// Makes a calibrator of arms whose link 1 has the nominal length `nominal_m`, updated every `period_s`.
+    pub fn new(settings: &CalibrationSettings, nominal_m: f32, period_s: f32) -> Self {
         Self {
             nominal_m,
             deviation_m: settings.tolerance * nominal_m,
-            most_readings: (AVERAGING_S / tick_s).at_least(1.0),
+            most_readings: (AVERAGING_S / period_s).at_least(1.0),
             mean: 0.0,
             readings: 0.0,
         }

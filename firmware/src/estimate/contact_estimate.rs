@@ -5,8 +5,8 @@ use nalgebra::Vector2;
 use super::friction::FrictionEstimate;
 use super::response::ContactResponse;
 
-/// The contact estimate at a tick: contact and force from its readings, the rest from those before, evaluated
-/// for the posture predicted for the tick.
+/// The contact estimate at a tick, for the posture predicted for it: contact and force from its readings, and in contact
+/// friction and p; the rest from the readings before.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct ContactEstimate {
     /// Whether the tip touches.

@@ -33,6 +33,9 @@ const REVERSAL_TICKS: u8 = 3;
 /// Random walk of μ, 1/√s.
 const DRIFT_PER_SQRT_S: f32 = 0.0005;
 
+/// Least variance of the noise of a ratio that is considered, as a part of the one that the force cell's noise gives.
+const LEAST_NOISE: f32 = 0.01;
+
 /// Averaging time of the innovations, s.
 const MEAN_S: f32 = 0.02;
 /// Square of the number of standard deviations at which that average is significant.
@@ -134,6 +137,7 @@ impl FrictionEstimator {
             force_variance_n2,
             first_variance,
             drift_variance: square(DRIFT_PER_SQRT_S) * tick_s,
+            // Three standard deviations.
             clear_force_n2: 9.0 * force_variance_n2,
             mean_weight: tick_s / (MEAN_S + tick_s),
             estimate: FrictionEstimate {
@@ -168,7 +172,7 @@ impl FrictionEstimator {
         let square_n2 = normal_n * normal_n;
         let mut variance_n2 = estimate.variance * square_n2;
         let noise_n2 = self.reading_variance_n2;
-        let quiet_n2 = (self.noise_variance * square_n2).limited(0.01 * noise_n2, noise_n2);
+        let quiet_n2 = (self.noise_variance * square_n2).limited(LEAST_NOISE * noise_n2, noise_n2);
         let differs = excess_n * excess_n > DIFFERENT_SQUARE * (variance_n2 + quiet_n2);
         estimate.sticks = differs && excess_n < 0.0 && is_dragged(estimate.slip);
         if estimate.sticks {
@@ -219,8 +223,9 @@ impl FrictionEstimator {
         let weight = self.mean_weight;
         let change = innovation - self.innovation;
         self.innovation = innovation;
-        let least_variance = 0.01 * ratio_variance;
+        let least_variance = LEAST_NOISE * ratio_variance;
         let most = NOISE_JUMP * (self.noise_variance + least_variance);
+        // The difference of two innovations has twice the variance of one; its average takes four times as long.
         let square = (0.5 * change * change).at_most(most);
         self.noise_variance += 0.25 * weight * (square - self.noise_variance);
         let ratio_variance = self.noise_variance.limited(least_variance, ratio_variance);

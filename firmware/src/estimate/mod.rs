@@ -27,7 +27,7 @@ use painleve_shared::counts::LinearConverter;
 use painleve_shared::frame::SensorFrame;
 use painleve_shared::{Arm, JointTorque, Pose, Slip};
 
-use self::belt::BeltEstimator;
+use self::belt::{BOUND_ERROR_M_S, BeltEstimator};
 use self::calibration::LengthCalibrator;
 use self::contact::{ContactDetector, Evidence};
 pub use self::contact_estimate::ContactEstimate;
@@ -41,7 +41,7 @@ use crate::last_command::LastCommand;
 use crate::schedule::Turn;
 
 /// Least velocity by which a sticking tip falls behind its reference, m/s.
-const DRAGGED_M_S: f32 = 0.02;
+const DRAGGED_M_S: f32 = 2.0 * BOUND_ERROR_M_S;
 
 /// What the update after a tick needs of it besides the estimates.
 #[derive(Clone, Copy, Debug, Default)]

@@ -109,9 +109,9 @@ impl Model {
         Self::in_pose(arm, &pose, theta_rad, theta_dot_rad_s, disturbance_nm)
     }
 
-    /// Moves the model to these link angles θ (rad) and rates θ̇ (rad/s) nearby, to first order: everything that the inverse
-    /// dynamics need. M⁻¹, Q and the free normal acceleration stay those of the predicted state, from which an encoder's
-    /// count is a fraction of a milliradian away.
+    /// Moves the model to these link angles θ (rad) and rates θ̇ (rad/s) nearby, to first order: the tip, and everything that
+    /// the inverse dynamics need. M⁻¹, Q, det J and the slope of the free normal acceleration stay those of the predicted
+    /// state, from which an encoder's count is a fraction of a milliradian away.
     #[inline]
     pub fn move_to(
         &mut self,

@@ -161,6 +161,7 @@ impl Moments {
     fn response(&self, weight: f32) -> (f32, f32) {
         let largest = |most: f32, product: &f32| product.at_least(most);
         let most = self.products.iter().fold(0.0, largest);
+        // Not zero where nothing was expected: the response is then unknown.
         let square = self.expected.at_least(1e-12);
         let variance = weight / (2.0 - weight) * self.measured * square;
         let deviation = (variance / f32::from(BLOCK_TICKS)).square_root() / square;
