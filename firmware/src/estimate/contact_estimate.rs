@@ -19,8 +19,6 @@ pub struct ContactEstimate {
     pub in_flight: bool,
     /// Measured contact force (f_t, f_n), N.
     pub force_n: Vector2<f32>,
-    /// Whether the force cell is not at the end of its range, where it reads less than the actual force.
-    pub in_range: bool,
     /// Estimated friction.
     pub friction: FrictionEstimate,
     /// p with that friction, 1/kg.

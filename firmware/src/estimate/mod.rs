@@ -134,13 +134,12 @@ impl Estimators {
                 self.decision.update_from_encoders(&encoders)
             }
         };
-        let (contact, range_n) = (&mut self.contact, self.force_range_n);
+        let contact = &mut self.contact;
         let touched = core::mem::replace(&mut contact.touches, touches);
         contact.lands = touches && !touched;
         contact.leaves = touched && !touches;
         contact.in_flight = self.decision.is_in_flight();
         contact.force_n = force_n;
-        contact.in_range = force_n.x.abs() < range_n && force_n.y.abs() < range_n;
         self.correct_friction(last.reference_velocity_m_s);
         followed
     }
@@ -151,7 +150,7 @@ impl Estimators {
         if !self.contact.touches {
             return;
         }
-        if self.contact.in_range {
+        if self.is_in_range() {
             let tip_velocity_m_s = self.model.tip_velocity_m_s.x;
             let is_dragged = |slip: Slip| {
                 let lag_m_s = reference_velocity_m_s - tip_velocity_m_s;
@@ -166,13 +165,20 @@ impl Estimators {
             .p_per_kg(contact.friction.coefficient, contact.friction.slip);
     }
 
+    /// Returns whether the force cell is not at the end of its range, where it reads less than the actual force.
+    #[inline]
+    fn is_in_range(&self) -> bool {
+        let (force_n, range_n) = (&self.contact.force_n, self.force_range_n);
+        force_n.x.abs() < range_n && force_n.y.abs() < range_n
+    }
+
     /// Updates friction, belt and response of a contact with the force at the last tick, and what has this turn. Returns
     /// whether the turn of the edges is free for them.
     #[inline]
     pub fn learn_in_contact(&mut self, observed: &Observed, turn: Turn) -> bool {
         let is_informative = self.add_to_balance(observed);
         let (model, contact) = (&self.model, &self.contact);
-        if contact.in_range {
+        if self.is_in_range() {
             self.friction.update(&contact.force_n);
         }
         let friction = self.friction.estimate();
@@ -227,10 +233,9 @@ impl Estimators {
     /// not explain.
     #[inline]
     fn add_to_balance(&mut self, observed: &Observed) -> bool {
-        let contact = &self.contact;
-        let is_informative = self.decision.is_certain() && contact.in_range && observed.drove;
+        let is_informative = self.decision.is_certain() && self.is_in_range() && observed.drove;
         if is_informative {
-            let (torque_nm, force_n) = (&observed.torque_nm, &contact.force_n);
+            let (torque_nm, force_n) = (&observed.torque_nm, &self.contact.force_n);
             self.disturbance
                 .add(torque_nm, force_n, observed.elapsed_ticks);
         } else {
