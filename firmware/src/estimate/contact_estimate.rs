@@ -23,7 +23,7 @@ pub struct ContactEstimate {
     pub friction: FrictionEstimate,
     /// p with that friction, 1/kg.
     pub p_per_kg: f32,
-    /// p/Q22.
+    /// p/Q22 before the tick's readings, as the response assumes.
     pub p_ratio: f32,
     /// What the contact's response to torque allows.
     pub response: ContactResponse,

@@ -40,9 +40,6 @@ use self::response::ResponseEstimator;
 use crate::last_command::LastCommand;
 use crate::schedule::Turn;
 
-/// Least velocity by which a sticking tip falls behind its reference, m/s.
-const DRAGGED_M_S: f32 = 2.0 * BOUND_ERROR_M_S;
-
 /// What the update after a tick needs of it besides the estimates.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Observed {
@@ -154,7 +151,8 @@ impl Estimators {
             let tip_velocity_m_s = self.model.tip_velocity_m_s.x;
             let is_dragged = |slip: Slip| {
                 let lag_m_s = reference_velocity_m_s - tip_velocity_m_s;
-                slip.sign::<f32>() * lag_m_s > DRAGGED_M_S && self.belt.may_stick(tip_velocity_m_s)
+                let falls_behind = slip.sign::<f32>() * lag_m_s > 2.0 * BOUND_ERROR_M_S;
+                falls_behind && self.belt.may_stick(tip_velocity_m_s)
             };
             self.friction.correct(&self.contact.force_n, is_dragged);
         }
