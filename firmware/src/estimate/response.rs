@@ -308,6 +308,7 @@ impl ResponseEstimator {
             self.touched_s = 0.0;
             self.acting_probe_n = 0.0;
             self.probe_n = 0.0;
+            // What the contact is stays known; the law's damping begins anew from the force after the pause.
             self.give = 0.0;
             self.block = Default::default();
             self.block_ticks = 0;
