@@ -4,9 +4,12 @@
 //! From the first pose to the second, joint 1 turns by +90° and the elbow by −90°; from the second to the
 //! third, only the elbow, by −90°. This identifies the encoders and their directions.
 
+use painleve_firmware::estimate::encoder_correction::{EncoderCorrection, EncoderCorrector};
 use painleve_shared::JointTorque;
 use painleve_shared::counts::{EncoderCounts, EncoderScale, ForceCounts};
+use painleve_shared::{JointMotion, Pose};
 
+use crate::identification::terms;
 use crate::readings::{MeanReadings, Session, forward};
 use crate::{CommissionError, Deviation, Mistake, OperatorTask, Rig};
 
@@ -33,8 +36,10 @@ const TARE_TOLERANCE: f64 = 0.025;
 pub struct EncodersFound {
     /// Whether the encoders count backwards.
     pub reversed: [bool; 2],
-    /// Readings at angle zero, in the joints' directions, counts.
+    /// Readings at angle zero, in the joints' directions, without a correction, counts.
     pub offsets: [u32; 2],
+    /// Correction of the encoders whose directions and zeros are those of the scenario.
+    pub correction: EncoderCorrection,
     /// Readings of f_t and f_n without a load.
     pub tare: [ForceCounts; 2],
     /// Deviations from the scenario.
@@ -54,15 +59,14 @@ pub(crate) fn measure<R: Rig>(
     let reversed = directions(&scales, &held)?;
     let mut deviations = Vec::new();
     let mut offsets = [0; 2];
+    let mut correction = session.expected.correction;
+    let tilt_rad = session.expected.belt_tilt_rad;
     for joint in 0..2 {
         let scale = &scales[joint];
-        let measured = zero(
-            scale,
-            joint,
-            reversed[joint],
-            session.expected.belt_tilt_rad,
-            &held,
-        );
+        let zero = |correction: &EncoderCorrection| {
+            zero(scale, joint, reversed[joint], tilt_rad, correction, &held)
+        };
+        let measured = zero(&correction);
         let error_deg = degrees(scale, scale.difference(scale.offset, measured));
         if reversed[joint] != session.expected.converters.mounting.encoder_reversed[joint] {
             deviations.push(Deviation::EncoderDirection { joint });
@@ -72,12 +76,17 @@ pub(crate) fn measure<R: Rig>(
             offsets[joint] = scale.offset.0;
             continue;
         }
-        offsets[joint] = measured.0;
+        // The correction was that of the encoder as it was.
+        for values_rad in terms(&mut correction).map(|(_, values_rad)| values_rad) {
+            values_rad[joint] = 0.0;
+        }
+        offsets[joint] = zero(&correction).0;
     }
     let tare = tare(session, &held, &mut deviations)?;
     Ok(EncodersFound {
         reversed,
         offsets,
+        correction,
         tare,
         deviations,
     })
@@ -116,22 +125,25 @@ fn directions(scales: &[EncoderScale; 2], held: &[MeanReadings]) -> Result<[bool
     Ok([first_turn < 0.0, elbow_only > 0.0])
 }
 
-/// Returns the reading at joint angle zero, in the joint's direction: the mean over the poses.
+/// Returns the reading of an encoder's own zero, to which the correction is added, in the joint's direction: the mean over
+/// the poses.
 fn zero(
     scale: &EncoderScale,
     joint: usize,
     reversed: bool,
     belt_tilt_rad: f64,
+    correction: &EncoderCorrection,
     held: &[MeanReadings],
 ) -> EncoderCounts {
+    let corrector = EncoderCorrector::new(correction);
     let zeros = held.iter().zip(POSES_DEG).map(|(held, [one, two])| {
         // The belt's inward normal is not plumb if the belt is tilted; the elbow's angle does not change.
-        let joint_rad = if joint == 0 {
-            one.to_radians() - belt_tilt_rad
-        } else {
-            (two - one).to_radians()
-        };
-        let angle = (joint_rad / scale.rad_per_count::<f64>()).round() as i32;
+        let joints_rad = [one.to_radians() - belt_tilt_rad, (two - one).to_radians()];
+        let [one_rad, elbow_rad] = joints_rad.map(|it| it as f32);
+        let pose = Pose::new(&JointMotion::new(one_rad, elbow_rad).to_links());
+        let added_rad = corrector.in_pose(&pose).unwrap_or_default().to_array()[joint];
+        let encoder_rad = joints_rad[joint] - f64::from(added_rad);
+        let angle = (encoder_rad / scale.rad_per_count::<f64>()).round() as i32;
         let reading = forward(scale, held.joints[joint], reversed);
         EncoderCounts(reading.0.wrapping_add_signed(-angle) & (scale.modulus() - 1))
     });

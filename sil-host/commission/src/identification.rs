@@ -116,10 +116,10 @@ pub fn prior(scenario: &Scenario, drawn: &Drawn) -> Prior {
 }
 
 /// A parameter of each joint's encoder.
-type OfJoint = fn(usize) -> Parameter;
+pub(crate) type OfJoint = fn(usize) -> Parameter;
 
 /// Returns the parameters of the encoders, each with its setting.
-fn terms(correction: &mut EncoderCorrection) -> [(OfJoint, &mut [f32; 2]); 5] {
+pub(crate) fn terms(correction: &mut EncoderCorrection) -> [(OfJoint, &mut [f32; 2]); 5] {
     [
         (Parameter::Zero, &mut correction.zero_rad),
         (Parameter::Sine, &mut correction.sine_rad),
@@ -133,9 +133,10 @@ fn terms(correction: &mut EncoderCorrection) -> [(OfJoint, &mut [f32; 2]); 5] {
 /// tape leave unknown.
 pub(crate) fn suppose_drawn(scenario: &mut Scenario) {
     if scenario.knowledge == Knowledge::default() {
-        let prior = prior(scenario, &Drawn::default());
+        let drawn_m = setting(prior(scenario, &Drawn::default()).tip_deviation_m());
         scenario.knowledge.source = "drawn, zeros by plumb line".into();
-        scenario.controller.estimator.tip_deviation_m = setting(prior.tip_deviation_m());
+        let deviation_m = &mut scenario.controller.estimator.tip_deviation_m;
+        *deviation_m = deviation_m.max(drawn_m);
     }
 }
 

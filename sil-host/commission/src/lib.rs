@@ -33,9 +33,10 @@ pub mod slide;
 pub mod stages;
 
 use painleve_firmware::configuration::Converters;
+use painleve_firmware::estimate::encoder_correction::EncoderCorrection;
 use painleve_plant::decimal::as_written;
 use painleve_plant::mechanics::motion::theta;
-use painleve_plant::scenario::{InitialState, Scenario};
+use painleve_plant::scenario::{InitialState, Knowledge, Scenario};
 use painleve_shared::counts::{EncoderCounts, ForceCounts, TorqueCounts};
 use painleve_shared::mounting::Mounting;
 use painleve_shared::{Arm, ArmParameters, LinkMotion, OutOfRange, Posture};
@@ -165,6 +166,8 @@ pub struct Expected {
     pub belt_tilt_rad: f64,
     /// Scalings and mounting as in the scenario.
     pub converters: Converters,
+    /// Correction of the encoders as in the scenario.
+    pub correction: EncoderCorrection,
     /// Posture of the scenario's start.
     pub posture: Posture,
     /// Largest torque that the procedure may command, N·m.
@@ -181,10 +184,7 @@ impl Expected {
     pub fn new(scenario: &Scenario, torque_limit_nm: f64) -> Result<Self, OutOfRange> {
         let configuration = scenario.controller_configuration();
         let arm = ArmParameters {
-            // In double precision: unless another is measured, the corrected scenario has this height.
-            height_m: scenario
-                .arm_model
-                .map_or(scenario.arm.height_m, |model| as_written(model.height_m)),
+            height_m: assumed_height_m(scenario),
             ..configuration.arm.cast()
         };
         let start = theta(&scenario.initial.state(&scenario.arm)?);
@@ -192,6 +192,7 @@ impl Expected {
             arm: Arm::new(arm)?,
             belt_tilt_rad: f64::from(configuration.arm.belt_tilt_rad),
             converters: configuration.converters,
+            correction: configuration.settings.estimator.encoders,
             posture: Posture::of(&start),
             torque_limit_nm,
             tick_hz: f64::from(configuration.tick_hz),
@@ -199,13 +200,24 @@ impl Expected {
     }
 }
 
+/// Returns the belt's height as the controller assumes it, in double precision: unless another is measured, the corrected
+/// scenario has this height.
+fn assumed_height_m(scenario: &Scenario) -> f64 {
+    scenario
+        .arm_model
+        .map_or(scenario.arm.height_m, |model| as_written(model.height_m))
+}
+
 /// Result of a commissioning.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Commissioned {
     /// Directions and zeros as measured.
     pub mounting: Mounting,
-    /// Readings of the encoders at angle zero, in the joints' directions, counts.
+    /// Readings of the encoders at angle zero, in the joints' directions, without a correction, counts.
     pub encoder_offsets: [u32; 2],
+    /// Correction of the encoders: that of the scenario where direction and zero are still those of the scenario, none
+    /// elsewhere.
+    pub correction: EncoderCorrection,
     /// Height of the first joint over the belt, m.
     pub height_m: f64,
     /// Friction coefficient; `None` if the tip did not slide within the torque limit.
@@ -223,8 +235,17 @@ impl Commissioned {
     /// [`OutOfRange`] if the arm does not reach the belt at its measured height.
     pub fn applied_to(&self, scenario: &Scenario) -> Result<Scenario, OutOfRange> {
         let mut corrected = scenario.clone();
+        let directions = scenario.converters.mounting.encoder_reversed;
+        let is_other = directions != self.mounting.encoder_reversed
+            || scenario.converters.encoder.offset_counts != self.encoder_offsets
+            || self.height_m != assumed_height_m(scenario);
+        if is_other {
+            // Whatever was known is that of the arm as it was.
+            corrected.knowledge = Knowledge::default();
+        }
         corrected.converters.mounting = self.mounting;
         corrected.converters.encoder.offset_counts = self.encoder_offsets;
+        corrected.controller.estimator.encoders = self.correction;
         corrected.arm.height_m = self.height_m;
         if let Some(model) = &mut corrected.arm_model {
             model.height_m = self.height_m as f32;
@@ -256,7 +277,7 @@ pub fn commission<R: Rig>(
 ) -> Result<Commissioned, CommissionError<R::Error>> {
     let mut session = Session::new(rig, expected);
     let encoders = encoders::measure(&mut session)?;
-    session.set_encoders(encoders.reversed, encoders.offsets);
+    session.set_encoders(encoders.reversed, encoders.offsets, encoders.correction);
     let rest = rest::measure(&mut session, &encoders.tare)?;
     let stages = stages::measure(&mut session, &rest)?;
     session.set_stages(stages.reversed);
@@ -273,6 +294,7 @@ pub fn commission<R: Rig>(
             ..expected.converters.mounting
         },
         encoder_offsets: encoders.offsets,
+        correction: encoders.correction,
         height_m: rest.height_m,
         friction,
         rest_rad: rest.theta_rad,

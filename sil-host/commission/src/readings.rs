@@ -1,6 +1,7 @@
 //! A session with a rig: mean readings, in the units and directions found so far.
 
 use nalgebra::Vector2;
+use painleve_firmware::estimate::encoder_correction::{EncoderCorrection, EncoderCorrector};
 use painleve_shared::counts::{EncoderCounts, EncoderScale, ForceCounts, TorqueCounts};
 use painleve_shared::{JointMotion, JointTorque, LinkMotion};
 
@@ -27,6 +28,7 @@ pub(crate) struct Session<'a, R> {
     pub expected: &'a Expected,
     reversed: [bool; 2],
     offsets: [u32; 2],
+    corrector: EncoderCorrector,
     stage_reversed: [bool; 2],
 }
 
@@ -37,14 +39,21 @@ impl<'a, R: Rig> Session<'a, R> {
             expected,
             reversed: [false; 2],
             offsets: [0; 2],
+            corrector: EncoderCorrector::new(&EncoderCorrection::default()),
             stage_reversed: [false; 2],
         }
     }
 
-    /// Uses these directions and zeros from now on.
-    pub fn set_encoders(&mut self, reversed: [bool; 2], offsets: [u32; 2]) {
+    /// Uses these directions, zeros and correction from now on.
+    pub fn set_encoders(
+        &mut self,
+        reversed: [bool; 2],
+        offsets: [u32; 2],
+        correction: EncoderCorrection,
+    ) {
         self.reversed = reversed;
         self.offsets = offsets;
+        self.corrector = EncoderCorrector::new(&correction);
     }
 
     /// Uses these polarities from now on.
@@ -160,6 +169,10 @@ impl<'a, R: Rig> Session<'a, R> {
             let forward = forward(&scale, joints[joint], self.reversed[joint]);
             angles[joint] =
                 f64::from(scale.counts_from_zero(forward)) * scale.rad_per_count::<f64>();
+        }
+        let corrections_rad = self.corrector.at(angles.map(|angle| angle as f32));
+        for (angle, correction_rad) in angles.iter_mut().zip(corrections_rad) {
+            *angle += f64::from(correction_rad);
         }
         Some(JointMotion::new(angles[0], angles[1]).to_links())
     }

@@ -8,10 +8,11 @@ use painleve_shared::mounting::{Mounting, SensorParts};
 
 use crate::{Commissioned, Deviation};
 
-/// Returns a scenario whose first sensors are the second ones of this.
+/// Returns a scenario whose first sensors are the second ones of this. The correction is that of the first encoders.
 pub fn in_place_of_first(scenario: &Scenario) -> Scenario {
     let mut swapped = scenario.clone();
     let mounting = scenario.converters.mounting;
+    swapped.controller.estimator.encoders = Default::default();
     swapped.converters.mounting = Mounting {
         sensors: SensorParts::Second,
         encoder_reversed: mounting.second_encoder_reversed,

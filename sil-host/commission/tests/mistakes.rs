@@ -6,6 +6,7 @@ use painleve_commission::simulated::{BuiltInMistake, SimulatedRig, random_arm};
 use painleve_commission::{CommissionError, Commissioned, Expected, commission};
 use painleve_plant::decimal::as_written;
 use painleve_plant::scenario::Scenario;
+use painleve_shared::{Arm, Pose};
 
 const TORQUE_LIMIT_NM: f64 = 1.0;
 
@@ -155,6 +156,103 @@ fn a_corrected_scenario_describes_the_arm() {
             corrected
         );
     }
+}
+
+/// An arm that has been identified: its encoders' errors are corrected, and known.
+fn identified() -> Scenario {
+    let overrides = [
+        "controller.estimator.encoders.zero_rad=[0.045, -0.04]",
+        "controller.estimator.encoders.cosine_rad=[0.005, -0.004]",
+        "controller.estimator.tip_deviation_m=3e-4",
+        "knowledge.source=slides",
+        "knowledge.off_line_m=2e-5",
+    ];
+    let scenario = Scenario::default();
+    scenario
+        .with_overrides("identified", &overrides.map(String::from))
+        .unwrap()
+}
+
+/// Distance of the resting tip from the belt by what was measured, m.
+fn gap_m(commissioned: &Commissioned, scenario: &Scenario) -> f64 {
+    let tip = Arm::new(scenario.arm)
+        .unwrap()
+        .tip_m(&Pose::new(&commissioned.rest_rad));
+    tip.y + scenario.arm.height_m
+}
+
+#[test]
+fn an_identified_arm_stays_identified() {
+    let scenario = identified();
+    for seed in 1..5 {
+        let commissioned = commissioned(&scenario, None, seed).unwrap();
+        assert_eq!(commissioned.deviations, []);
+        let gap_m = gap_m(&commissioned, &scenario);
+        assert!(gap_m.abs() < 3e-4, "{gap_m}");
+        let corrected = commissioned.applied_to(&scenario).unwrap();
+        assert_eq!(corrected.knowledge, scenario.knowledge);
+        assert_eq!(
+            corrected.controller.estimator,
+            scenario.controller.estimator
+        );
+    }
+}
+
+#[test]
+fn a_magnet_that_has_been_turned_takes_its_correction_and_what_was_known_with_it() {
+    let scenario = identified();
+    for (joint, mistake) in [
+        (0, BuiltInMistake::FirstEncoderTurned),
+        (1, BuiltInMistake::ElbowEncoderTurned),
+    ] {
+        let commissioned = commissioned(&scenario, Some(mistake), 1).unwrap();
+        assert_eq!(commissioned.deviations.len(), 1);
+        // To half a degree of the operator's hands, and the error once around.
+        let gap_m = gap_m(&commissioned, &scenario);
+        assert!(gap_m.abs() < 2e-3, "{gap_m}");
+        let corrected = commissioned.applied_to(&scenario).unwrap();
+        let estimator = &corrected.controller.estimator;
+        let mut encoders = scenario.controller.estimator.encoders;
+        encoders.zero_rad[joint] = 0.0;
+        encoders.cosine_rad[joint] = 0.0;
+        assert_eq!(estimator.encoders, encoders);
+        assert!(
+            estimator.tip_deviation_m > 0.01,
+            "{}",
+            estimator.tip_deviation_m
+        );
+        assert_eq!(corrected.knowledge.off_line_m, 0.0);
+        // Commissioned again, the arm is as the scenario says.
+        let expected = Expected::new(&corrected, TORQUE_LIMIT_NM).unwrap();
+        let mut rig = SimulatedRig::new(&scenario, Some(mistake), 2);
+        let again = commission(&mut rig, &expected).unwrap();
+        assert_eq!(again.deviations, []);
+    }
+}
+
+#[test]
+fn a_belt_that_has_been_moved_leaves_the_correction_and_takes_what_was_known() {
+    let scenario = identified();
+    let commissioned = commissioned(&scenario, Some(BuiltInMistake::BeltTooHigh), 1).unwrap();
+    let corrected = commissioned.applied_to(&scenario).unwrap();
+    let estimator = &corrected.controller.estimator;
+    assert_eq!(estimator.encoders, scenario.controller.estimator.encoders);
+    assert!(
+        estimator.tip_deviation_m > 0.01,
+        "{}",
+        estimator.tip_deviation_m
+    );
+}
+
+#[test]
+fn play_that_the_operator_has_told_is_kept() {
+    let told = "controller.estimator.tip_deviation_m=0.05".to_owned();
+    let scenario = Scenario::default().with_overrides("play", &[told]).unwrap();
+    let corrected = commissioned(&scenario, None, 1)
+        .unwrap()
+        .applied_to(&scenario)
+        .unwrap();
+    assert_eq!(corrected.controller.estimator.tip_deviation_m, 0.05);
 }
 
 #[test]

@@ -6,6 +6,9 @@ mod random_arm;
 mod slides;
 mod wiring;
 
+use painleve_identify::Parameters;
+use painleve_identify::geometry::encoder_rad;
+use painleve_identify::parameters::Drawn;
 use painleve_plant::mechanics::belt::BeltProfile;
 use painleve_plant::plant::PlantError;
 use painleve_plant::scenario::{InitialState, Scenario};
@@ -21,6 +24,7 @@ pub use random_arm::random_arm;
 pub use slides::{GeometryMistake, PlantOf, SimulatedSlides};
 pub use wiring::Wiring;
 
+use crate::identification::prior;
 use crate::{OperatorTask, RawReadings, Rig};
 
 /// Largest error of a held angle, degrees.
@@ -49,6 +53,8 @@ pub struct SimulatedRig {
     actual: Scenario,
     wiring: Wiring,
     encoders: [EncoderScale; 2],
+    /// Errors of the encoders: those that the scenario's correction takes off.
+    geometry: Parameters,
     /// Link angles at which the operator holds the arm, rad; `None` once it is set down.
     held_rad: Option<LinkMotion<f64>>,
     simulation: Option<Simulation>,
@@ -78,6 +84,7 @@ impl SimulatedRig {
                 offset: EncoderCounts(0),
                 ..it
             }),
+            geometry: prior(scenario, &Drawn::default()).parameters,
             held_rad: Some(LinkMotion::zeros()),
             simulation: None,
             stages_are_on: false,
@@ -115,6 +122,12 @@ impl SimulatedRig {
                 (joints, [ForceCounts(0); 2])
             }
         };
+        let joints = [0, 1].map(|joint| {
+            let scale = &self.encoders[joint];
+            let counts = f64::from(scale.counts_from_zero(joints[joint]));
+            let joint_rad = counts * scale.rad_per_count::<f64>();
+            scale.reading(encoder_rad(&self.geometry, joint, joint_rad))
+        });
         let mut noise = || ForceCounts(self.generator.random_range(-NOISE_COUNTS..=NOISE_COUNTS));
         let forces = forces.map(|it| ForceCounts(it.0 + noise().0));
         let force_scale = self.actual.converters.scales().force;
