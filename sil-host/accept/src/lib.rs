@@ -14,7 +14,7 @@ mod report;
 pub mod steps;
 
 use painleve_board::{BoardError, Port, Serial};
-use painleve_shared::stored::StoredState;
+use painleve_shared::stored::{StoredConfiguration, StoredState};
 
 pub use bench::{Bench, StepError};
 pub use report::{Acceptance, Check, StepReport, Verdict};
@@ -70,7 +70,36 @@ pub fn accept<P: Port>(
             break;
         }
     }
+    let storing = reports.iter().position(|it| it.name == "flash");
+    let storing = storing.unwrap_or(0);
+    if let (Some(check), Some(report)) = (empty(&mut bench), reports.get_mut(storing)) {
+        report.checks.push(check);
+        report.verdict = Verdict::of(&report.checks);
+        done(report);
+    }
     // Registers have their usual values again, and the board may drive an arm.
     let _ = bench.reset();
     Ok(Acceptance::new(bench.chip, reports))
+}
+
+/// Erases the configuration that a step has left behind when it failed: with it, the board would drive an arm by itself.
+/// Returns a check that has failed if that does not work.
+fn empty<P: Port>(bench: &mut Bench<P>) -> Option<Check> {
+    let is_empty = |found: &StoredConfiguration| found.state == StoredState::Empty;
+    if bench.board.stored().is_ok_and(|found| is_empty(&found)) {
+        return None;
+    }
+    // It erases only while it waits for frames.
+    let left = match bench.rest().and_then(|()| Ok(bench.board.forget()?)) {
+        Ok(found) if is_empty(&found) => return None,
+        Ok(found) => format!("{:?}, version {}", found.state, found.version),
+        Err(error) => error.to_string(),
+    };
+    let expected = "Empty: erase it with `painleve drive --forget`";
+    Some(Check::new(
+        "stored configuration at the end",
+        left,
+        expected,
+        false,
+    ))
 }
