@@ -16,13 +16,16 @@ use painleve_shared::mounting::{Mounting, SensorParts};
 use painleve_shared::status::{Fault, SupervisorState};
 
 use crate::CommandError;
-use crate::drive::{Operator, OperatorCommand};
+use crate::drive::{Ended, Operator};
 
 /// Longest wait for the board before checking for the operator and signals.
 const PATIENCE: Duration = Duration::from_millis(20);
 
 /// Longest time between the operator's task to close the switch and torque.
 const ENABLE_LIMIT: Duration = Duration::from_secs(60);
+
+/// Time after which a request for the board's counters is repeated: the line may lose it, or its answer.
+const AGAIN: Duration = Duration::from_millis(200);
 
 /// Failure of a real arm.
 #[derive(Debug, thiserror::Error)]
@@ -42,14 +45,23 @@ pub enum BoardRigError {
     )]
     Refused,
     /// The stages were not enabled.
-    #[error("the torque stages were not enabled within {} s", ENABLE_LIMIT.as_secs())]
-    NotEnabled,
+    #[error("the torque stages were not enabled within {} s", .0.as_secs())]
+    NotEnabled(Duration),
+    /// A slide has begun, but not ended.
+    #[error("the slide has begun, but has not ended within {} s", .0.as_secs())]
+    NotEnded(Duration),
     /// The stages went off.
     #[error("the torque stages went off: the switch was opened, or a sensor or a stage failed")]
     Off,
     /// The board has latched a fault.
     #[error("the board has latched fault {}: {}", *.0 as u8, .0.description())]
     Faulted(Fault),
+}
+
+impl From<Ended> for BoardRigError {
+    fn from(_: Ended) -> Self {
+        Self::Interrupted
+    }
 }
 
 impl From<BoardRigError> for CommandError {
@@ -129,33 +141,32 @@ impl BoardRig {
         Ok(event)
     }
 
-    /// Returns the next tick with readings, if one arrives soon.
+    /// Returns the next tick with readings, if one arrives soon and the operator does not stop the arm.
     fn next_tick(&mut self) -> Result<Option<(SensorFrame, ActuatorFrame)>, BoardRigError> {
+        self.operator.attend()?;
         Ok(match self.next_event()? {
             Some(ArmEvent::Tick { sensor, answer }) => sensor.map(|sensor| (sensor, answer)),
             _ => None,
         })
     }
 
-    /// Returns whether the operator has pressed the return key since the last call.
-    fn is_confirmed(&mut self) -> Result<bool, BoardRigError> {
-        match self.operator.order() {
-            Some(OperatorCommand::Stop) => Err(BoardRigError::Interrupted),
-            Some(OperatorCommand::Confirm) => Ok(true),
-            _ => Ok(false),
-        }
-    }
-
     /// Waits until the operator has done a task.
     fn wait_for_operator(&mut self) -> Result<(), BoardRigError> {
-        while !self.is_confirmed()? {
+        while !self.operator.confirms()? {
             self.next_event()?;
         }
         // On a busy machine, ticks from before the task was done may still wait on the line: all ticks behind the
         // board's answer are later.
-        self.arm.ask_for_health()?;
-        while !matches!(self.next_event()?, Some(ArmEvent::Health(_))) {}
-        Ok(())
+        loop {
+            self.arm.ask_for_health()?;
+            let asked = Instant::now();
+            while asked.elapsed() < AGAIN {
+                self.operator.attend()?;
+                if let Some(ArmEvent::Health(_)) = self.next_event()? {
+                    return Ok(());
+                }
+            }
+        }
     }
 
     /// Waits until the board has armed.
@@ -163,8 +174,6 @@ impl BoardRig {
         self.arm.permit_arming(true)?;
         let start = Instant::now();
         while start.elapsed() < ENABLE_LIMIT {
-            // The return key has no meaning here; `stop` has.
-            self.is_confirmed()?;
             let Some((sensor, answer)) = self.next_tick()? else {
                 continue;
             };
@@ -175,7 +184,7 @@ impl BoardRig {
                 return Err(BoardRigError::Refused);
             }
         }
-        Err(BoardRigError::NotEnabled)
+        Err(BoardRigError::NotEnabled(ENABLE_LIMIT))
     }
 }
 
@@ -183,6 +192,8 @@ impl Rig for BoardRig {
     type Error = BoardRigError;
 
     fn instruct(&mut self, instruction: OperatorTask) -> Result<(), BoardRigError> {
+        // What was typed before confirms no task.
+        self.operator.attend()?;
         if instruction == OperatorTask::Enable {
             warn(format_args!("operator: {instruction}"));
             self.wait_for_enable()?;

@@ -24,7 +24,8 @@ use painleve_shared::mounting::SensorParts;
 use painleve_shared::range;
 use serde::Serialize;
 
-pub use self::operator::{Operator, OperatorCommand};
+use self::operator::OperatorCommand;
+pub use self::operator::{Ended, Operator};
 use self::view::View;
 use super::distinct_files::check_distinct;
 use super::output::keep_partial;
@@ -93,6 +94,13 @@ struct DriveReport {
     state: &'static str,
     /// Number of the latched fault, 0 for none.
     fault: u8,
+}
+
+impl DriveReport {
+    /// Returns the ticks of the board's clock.
+    fn elapsed_ticks(&self) -> u64 {
+        self.ticks + self.lost_ticks
+    }
 }
 
 /// Connects to the board, configures it, and monitors it until the operator stops it.
@@ -222,7 +230,7 @@ impl Drive {
         let mut health = Instant::now();
         while !interrupt.is_requested() {
             match operator.order() {
-                None | Some(OperatorCommand::Confirm) => {}
+                None | Some(OperatorCommand::Confirm | OperatorCommand::End) => {}
                 Some(OperatorCommand::Arm) => self.arm.permit_arming(true)?,
                 Some(OperatorCommand::Disarm) => self.arm.permit_arming(false)?,
                 Some(OperatorCommand::Stop) => return Ok(()),
@@ -242,7 +250,7 @@ impl Drive {
                 Some(ArmEvent::Health(health)) => self.view.show_health(&health, self.arm.line()),
                 Some(ArmEvent::Tick { sensor, answer }) => {
                     self.take(sensor, &answer, recorder)?;
-                    if limit.is_some_and(|limit| self.report.ticks as f64 >= limit) {
+                    if limit.is_some_and(|limit| self.report.elapsed_ticks() as f64 >= limit) {
                         return Ok(());
                     }
                 }
@@ -333,7 +341,7 @@ fn lost_between(before: u32, now: u32) -> u64 {
 
 #[cfg(test)]
 mod tests {
-    use super::lost_between;
+    use super::{DriveReport, lost_between};
 
     #[test]
     fn a_board_that_counts_anew_has_lost_no_ticks() {
@@ -342,5 +350,15 @@ mod tests {
         assert_eq!(lost_between(u32::MAX, 1), 1);
         assert_eq!(lost_between(7, 3), 0);
         assert_eq!(lost_between(7, 7), 0);
+    }
+
+    #[test]
+    fn lost_ticks_have_passed_on_the_boards_clock() {
+        let report = DriveReport {
+            ticks: 70,
+            lost_ticks: 30,
+            ..DriveReport::default()
+        };
+        assert_eq!(report.elapsed_ticks(), 100);
     }
 }

@@ -1,7 +1,9 @@
 //! The operator's commands: lines on standard input.
 
 use std::io::{self, BufRead};
-use std::sync::mpsc::{Receiver, sync_channel};
+use std::sync::mpsc::{Receiver, SyncSender, TryRecvError, sync_channel};
+
+use painleve_process::terminal::warn;
 
 /// Most commands that wait; further input is not read until then.
 const MOST_WAITING: usize = 16;
@@ -17,6 +19,8 @@ pub enum OperatorCommand {
     Stop,
     /// The return key alone: confirms a task.
     Confirm,
+    /// Standard input has ended: nobody confirms a task.
+    End,
     /// Anything else.
     Unknown(String),
 }
@@ -33,30 +37,90 @@ impl OperatorCommand {
     }
 }
 
+/// The operator has ended a procedure.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Ended;
+
 /// Reads commands without blocking the drive.
 pub struct Operator(Receiver<OperatorCommand>);
 
 impl Operator {
-    /// Starts reading standard input. Its end is not a command: the drive continues.
+    /// Starts reading standard input.
     ///
     /// # Errors
     /// If the thread cannot be started.
     pub fn listen() -> io::Result<Self> {
         let (sender, receiver) = sync_channel(MOST_WAITING);
-        std::thread::Builder::new().spawn(move || {
-            for line in io::stdin().lock().lines() {
-                let Ok(line) = line else { return };
-                if sender.send(OperatorCommand::of(&line)).is_err() {
-                    return;
-                }
-            }
-        })?;
+        std::thread::Builder::new().spawn(move || pass_on(io::stdin().lock(), &sender))?;
         Ok(Self(receiver))
     }
 
-    /// Returns the next command, if there is one.
+    /// Returns the next command, if there is one; after the last one always [`OperatorCommand::End`].
     pub fn order(&self) -> Option<OperatorCommand> {
-        self.0.try_recv().ok()
+        match self.0.try_recv() {
+            Ok(command) => Some(command),
+            Err(TryRecvError::Empty) => None,
+            Err(TryRecvError::Disconnected) => Some(OperatorCommand::End),
+        }
+    }
+
+    /// Returns whether the operator has confirmed a task.
+    ///
+    /// # Errors
+    /// [`Ended`] if the operator ends the procedure, or can no longer confirm anything.
+    pub fn confirms(&self) -> Result<bool, Ended> {
+        match self.order() {
+            None => Ok(false),
+            Some(OperatorCommand::Confirm) => Ok(true),
+            Some(OperatorCommand::Stop | OperatorCommand::Disarm | OperatorCommand::End) => {
+                Err(Ended)
+            }
+            Some(OperatorCommand::Arm) => Ok(not_understood("arm")),
+            Some(OperatorCommand::Unknown(text)) => Ok(not_understood(&text)),
+        }
+    }
+
+    /// Takes what the operator has said while no task waits: only an end counts. The end of standard input is none.
+    ///
+    /// # Errors
+    /// [`Ended`] if the operator ends the procedure.
+    pub fn attend(&self) -> Result<(), Ended> {
+        loop {
+            match self.order() {
+                None | Some(OperatorCommand::End) => return Ok(()),
+                Some(OperatorCommand::Stop | OperatorCommand::Disarm) => return Err(Ended),
+                Some(OperatorCommand::Confirm) => {}
+                Some(OperatorCommand::Arm) => {
+                    not_understood("arm");
+                }
+                Some(OperatorCommand::Unknown(text)) => {
+                    not_understood(&text);
+                }
+            }
+        }
+    }
+}
+
+/// Tells what a procedure understands; returns that nothing is confirmed.
+fn not_understood(text: &str) -> bool {
+    warn(format_args!(
+        "unknown command {text:?}: the return key or stop"
+    ));
+    false
+}
+
+/// Passes on the lines of an input until it ends. A line may be in any character set.
+fn pass_on(mut input: impl BufRead, commands: &SyncSender<OperatorCommand>) {
+    let mut line = Vec::new();
+    while input
+        .read_until(b'\n', &mut line)
+        .is_ok_and(|read| read > 0)
+    {
+        let command = OperatorCommand::of(&String::from_utf8_lossy(&line));
+        if commands.send(command).is_err() {
+            return;
+        }
+        line.clear();
     }
 }
 
@@ -73,5 +137,46 @@ mod tests {
             let unknown = OperatorCommand::Unknown(other.into());
             assert_eq!(OperatorCommand::of(other), unknown);
         }
+    }
+
+    /// Returns an operator who has typed this and has left.
+    fn typed(input: &[u8]) -> Operator {
+        let (sender, receiver) = sync_channel(MOST_WAITING);
+        pass_on(input, &sender);
+        Operator(receiver)
+    }
+
+    #[test]
+    fn after_a_line_that_is_no_text_the_operator_is_still_heard() {
+        let operator = typed(b"\xff\nstop\n");
+        let unknown = OperatorCommand::Unknown("\u{fffd}".into());
+        assert_eq!(operator.order(), Some(unknown));
+        assert_eq!(operator.order(), Some(OperatorCommand::Stop));
+        for _ in 0..2 {
+            assert_eq!(operator.order(), Some(OperatorCommand::End));
+        }
+    }
+
+    #[test]
+    fn a_task_ends_with_the_operator_but_not_what_needs_none() {
+        let left = typed(b"");
+        assert_eq!(left.confirms(), Err(Ended));
+        assert_eq!(left.attend(), Ok(()));
+        for end in ["stop\n", "disarm\n"] {
+            assert_eq!(typed(end.as_bytes()).confirms(), Err(Ended));
+        }
+    }
+
+    #[test]
+    fn what_was_typed_before_a_task_does_not_confirm_it() {
+        let (sender, receiver) = sync_channel(MOST_WAITING);
+        let operator = Operator(receiver);
+        pass_on(&b"\narm\nwhat?\n\n"[..], &sender);
+        assert_eq!(operator.attend(), Ok(()));
+        assert_eq!(operator.confirms(), Ok(false));
+        pass_on(&b"\n"[..], &sender);
+        assert_eq!(operator.confirms(), Ok(true));
+        pass_on(&b"\n\nstop\n\n"[..], &sender);
+        assert_eq!(operator.attend(), Err(Ended));
     }
 }

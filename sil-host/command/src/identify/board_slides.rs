@@ -15,7 +15,7 @@ use painleve_shared::message::FrameSource;
 use painleve_shared::status::{Fault, SupervisorState};
 
 use crate::commission::BoardRigError;
-use crate::drive::{Operator, OperatorCommand};
+use crate::drive::Operator;
 
 /// Longest wait for the board before checking for the operator and signals.
 const PATIENCE: Duration = Duration::from_millis(20);
@@ -44,11 +44,10 @@ impl BoardSlides {
     }
 
     fn check(&self) -> Result<bool, BoardRigError> {
-        let order = self.operator.order();
-        if self.interrupt.is_requested() || order == Some(OperatorCommand::Stop) {
+        if self.interrupt.is_requested() {
             return Err(BoardRigError::Interrupted);
         }
-        Ok(order == Some(OperatorCommand::Confirm))
+        Ok(self.operator.confirms()?)
     }
 
     /// Collects the ticks of one slide.
@@ -84,7 +83,11 @@ impl BoardSlides {
                 return Err(BoardRigError::Off);
             }
         }
-        Err(BoardRigError::NotEnabled)
+        Err(if ticks.is_empty() {
+            BoardRigError::NotEnabled(duration + LIMIT)
+        } else {
+            BoardRigError::NotEnded(duration + LIMIT)
+        })
     }
 }
 
