@@ -23,7 +23,8 @@ use painleve_plant::decimal::as_written;
 use painleve_plant::mechanics::motion::theta;
 use painleve_plant::scenario::{Knowledge, Scenario, ScenarioError};
 use painleve_shared::counts::{EncoderScale, TorqueCounts};
-use painleve_shared::frame::SensorFrame;
+use painleve_shared::frame::{ActuatorFrame, SensorFrame, StatusFlags};
+use painleve_shared::status::SupervisorState;
 use painleve_shared::{Arm, ArmParameters, LinkMotion, OutOfRange, Pose, Posture};
 
 /// Normal force of a slide, N.
@@ -50,8 +51,15 @@ const BELT_M_S: f64 = 0.15;
 /// Multiple of the ripple's root mean square that the wanted normal force must exceed in use.
 const RIPPLES: f64 = 8.0;
 
-/// Rate at which the mean force follows, from which the ripple is taken, per tick.
-const MEAN_PER_TICK: f64 = 0.01;
+/// Time constant of the mean force from which the ripple is taken, s.
+const MEAN_S: f64 = 0.1;
+
+/// Where the values of an arm come from that has been drawn and commissioned.
+const DRAWN: &str = "drawn, zeros by plumb line";
+
+/// Largest deviation of a joint's friction or stiffness, as a part of the larger of its values before and now, with which the
+/// new value is better than the old one.
+const BETTER: f64 = 0.5;
 
 /// Normal forces of the attempts at a slide whose tip leaves the belt, N: torques that a badly known model takes for
 /// those of the arm may lift a tip that presses less.
@@ -66,21 +74,45 @@ pub struct SlideTick {
     pub torques: [TorqueCounts; 2],
 }
 
+/// What an arm has slid.
+#[derive(Clone, Debug, Default)]
+pub struct Slid {
+    /// The ticks in which the drive was tracking or had lost the belt, in order of time.
+    pub ticks: Vec<SlideTick>,
+    /// Whether the reference has come to its end.
+    pub is_complete: bool,
+}
+
+impl Slid {
+    /// Keeps a tick if it belongs to the slide.
+    pub fn push(&mut self, sensor: SensorFrame, answer: &ActuatorFrame) {
+        let state = answer.supervisor_state();
+        if !matches!(
+            state,
+            Some(SupervisorState::Tracking | SupervisorState::LiftOff)
+        ) {
+            return;
+        }
+        self.ticks.push(SlideTick {
+            sensor,
+            torques: answer.torques,
+        });
+        let is_done = answer.flags.contains(StatusFlags::REFERENCE_DONE);
+        self.is_complete |= is_done && state == Some(SupervisorState::Tracking);
+    }
+}
+
 /// An arm whose controller slides its tip, and its operator.
 pub trait SlideRig {
     /// Failure of the rig.
     type Error: std::error::Error;
 
     /// Has the tip set down in a posture and the belt run as the scenario says, runs the controller with its settings and
-    /// reference, and returns the ticks in which it was tracking.
+    /// reference, and returns the ticks from the start of the reference to its end, or until the tip was lost.
     ///
     /// # Errors
     /// If the operator gives up, or the rig or its drive fails.
-    fn slide(
-        &mut self,
-        scenario: &Scenario,
-        posture: Posture,
-    ) -> Result<Vec<SlideTick>, Self::Error>;
+    fn slide(&mut self, scenario: &Scenario, posture: Posture) -> Result<Slid, Self::Error>;
 }
 
 /// Reason for the end of an identification without a result.
@@ -134,9 +166,19 @@ pub(crate) fn terms(correction: &mut EncoderCorrection) -> [(OfJoint, &mut [f32;
 pub(crate) fn suppose_drawn(scenario: &mut Scenario) {
     if scenario.knowledge == Knowledge::default() {
         let drawn_m = setting(prior(scenario, &Drawn::default()).tip_deviation_m());
-        scenario.knowledge.source = "drawn, zeros by plumb line".into();
+        scenario.knowledge.source = DRAWN.into();
         let deviation_m = &mut scenario.controller.estimator.tip_deviation_m;
         *deviation_m = deviation_m.max(drawn_m);
+    }
+}
+
+/// Returns the deviation of the tip that the operator has told, m: for play of the gears, say. A file that has been
+/// commissioned or identified has that in its place.
+fn told_m(scenario: &Scenario) -> f64 {
+    if scenario.knowledge == Knowledge::default() {
+        f64::from(scenario.controller.estimator.tip_deviation_m)
+    } else {
+        0.0
     }
 }
 
@@ -150,7 +192,8 @@ pub fn limits(scenario: &Scenario) -> Limits {
     }
 }
 
-/// Returns the readings of ticks, by the scenario's zeros and scales. Ticks without all readings are left out.
+/// Returns the readings of ticks, by the scenario's zeros and scales. Ticks without all readings are left out. Encoders on the
+/// motors lead their joints by the twist of the gears under the torque of the tick before.
 pub fn readings(scenario: &Scenario, ticks: impl IntoIterator<Item = SlideTick>) -> Vec<Reading> {
     let scales = scenario.converters.scales();
     let [scale_1, scale_2] = scales.encoders;
@@ -162,21 +205,31 @@ pub fn readings(scenario: &Scenario, ticks: impl IntoIterator<Item = SlideTick>)
             && scales.force.contains(frame.normal_force.0)
             && scales.force.contains(frame.tangential_force.0)
     };
+    let soft_rad_nm = scenario.controller.estimator.gear_compliance_rad_nm;
     let rad = |scale: EncoderScale, reading| {
         f64::from(scale.counts_from_zero(reading)) * scale.rad_per_count::<f64>()
     };
+    let mut before_nm = None;
     ticks
         .into_iter()
-        .filter(|tick| is_whole(&tick.sensor))
-        .map(|SlideTick { sensor, torques }| Reading {
-            encoders_rad: [
-                rad(scale_1, sensor.joints[0]),
-                rad(scale_2, sensor.joints[1]),
-            ],
-            force_n: [sensor.tangential_force, sensor.normal_force]
-                .map(|force| f64::from(force.0) * newtons),
-            torque_nm: torques.map(|torque| f64::from(torque.0) * newton_metres),
+        .map(|SlideTick { sensor, torques }| {
+            let torque_nm = torques.map(|torque| f64::from(torque.0) * newton_metres);
+            let twisting_nm = before_nm.replace(torque_nm).unwrap_or(torque_nm);
+            let twist_rad = |joint: usize| f64::from(soft_rad_nm[joint]) * twisting_nm[joint];
+            let reading = Reading {
+                tick: sensor.tick,
+                encoders_rad: [
+                    rad(scale_1, sensor.joints[0]) - twist_rad(0),
+                    rad(scale_2, sensor.joints[1]) - twist_rad(1),
+                ],
+                force_n: [sensor.tangential_force, sensor.normal_force]
+                    .map(|force| f64::from(force.0) * newtons),
+                torque_nm,
+            };
+            (sensor, reading)
         })
+        .filter(|(sensor, _)| is_whole(sensor))
+        .map(|(_, reading)| reading)
         .collect()
 }
 
@@ -212,8 +265,15 @@ pub fn slide_scenario(
     let coupling = arm.inverse_inertia_row_on_belt(0.0, posture);
     let speed_m_s =
         BELT_M_S.copysign(coupling.map_or(1.0, |(tangential, ..)| f64::from(tangential)));
+    // A hybrid law keeps its gains.
+    let law = match scenario.controller.law.of_set() {
+        Some(LawSettings::Hybrid(_)) => {
+            format!("controller.law.hybrid.normal_force_n={force_n:?}")
+        }
+        _ => format!("controller.law={{ hybrid = {{ normal_force_n = {force_n:?} }} }}"),
+    };
     let overrides = [
-        format!("controller.law={{ hybrid = {{ normal_force_n = {force_n:?} }} }}"),
+        law,
         reference,
         format!("run.duration_s={duration_s}"),
         "run.enable_at_s=0.0".into(),
@@ -255,10 +315,16 @@ pub fn identify_arm<R: SlideRig>(
         for posture in postures {
             let mut attempt = |force_n| {
                 let program = slide_scenario(known, share, posture, force_n)?;
-                let ticks = rig.slide(&program, posture);
+                let slid = rig.slide(&program, posture);
+                let slid = slid.map_err(IdentificationError::Rig)?;
                 Ok::<_, IdentificationError<R::Error>>(Slide {
                     posture,
-                    readings: readings(scenario, ticks.map_err(IdentificationError::Rig)?),
+                    whole: if slid.is_complete {
+                        slid.ticks.len()
+                    } else {
+                        program.run.ticks() as usize
+                    },
+                    readings: readings(scenario, slid.ticks),
                 })
             };
             let [first_n, others_n @ ..] = ATTEMPTS_N;
@@ -274,7 +340,8 @@ pub fn identify_arm<R: SlideRig>(
     };
     let [near, far] = ROUNDS;
     let mut known = scenario.clone();
-    known.controller.estimator.tip_deviation_m = setting(prior.tip_deviation_m());
+    let deviation_m = libm::hypot(prior.tip_deviation_m(), told_m(scenario));
+    known.controller.estimator.tip_deviation_m = setting(deviation_m);
     let slid = slide(&known, near, [first, first.mirrored()])?;
     let identified = identify(&slid, &prior, &limits.of_first_look())?;
     let known = Found::new(identified, prior, &slid, scenario)?;
@@ -309,7 +376,9 @@ pub struct Found {
     pub prior: Prior,
     /// What the torques show.
     pub joints: Joints,
-    slides: Vec<Slide>,
+    /// Acceleration of the tip off the belt by what the controller does not know, root mean square, m/s²: the ripple of the
+    /// normal force times p. Zero without a reading on the belt.
+    pub ripple_m_s2: f64,
 }
 
 impl Found {
@@ -326,48 +395,13 @@ impl Found {
             ..scenario.controller_configuration().arm.cast()
         };
         let limits = limits(scenario);
+        let tick_hz = f64::from(scenario.run.tick_hz);
         Ok(Self {
-            joints: Joints::of(
-                slides,
-                geometry,
-                &known,
-                f64::from(scenario.run.tick_hz),
-                &limits,
-            )?,
+            joints: Joints::of(slides, geometry, &known, tick_hz, &limits)?,
+            ripple_m_s2: ripple_m_s2(slides, geometry, &Arm::new(known)?, tick_hz),
             identified,
             prior,
-            slides: slides.to_vec(),
         })
-    }
-
-    /// Returns the acceleration of the tip off the belt by what the controller does not know, root mean square, m/s²: the
-    /// ripple of the normal force times p. Zero without a reading on the belt.
-    ///
-    /// # Errors
-    /// [`OutOfRange`] for an arm that cannot be built.
-    pub fn ripple_m_s2(&self, arm: ArmParameters<f32>) -> Result<f64, OutOfRange> {
-        let arm = Arm::new(arm)?;
-        let parameters = &self.identified.fit.parameters;
-        let (mut sum, mut count) = (0.0, 0_u32);
-        for slide in &self.slides {
-            let mut mean_n = FORCE_N;
-            for reading in &slide.readings {
-                let [tangential_n, normal_n] = reading.force_n;
-                if normal_n < CONTACT_N {
-                    continue;
-                }
-                mean_n += MEAN_PER_TICK * (normal_n - mean_n);
-                let [first, elbow] =
-                    [0, 1].map(|joint| joint_rad(parameters, joint, reading.encoders_rad[joint]));
-                let theta = LinkMotion::new(first as f32, (first + elbow) as f32);
-                let q = arm.inverse_tip_inertia(&Pose::new(&theta));
-                let p = f64::from(q.m22) + f64::from(q.m12) * tangential_n / normal_n;
-                let off_m_s2 = p * (normal_n - mean_n);
-                sum += off_m_s2 * off_m_s2;
-                count += 1;
-            }
-        }
-        Ok(libm::sqrt(sum / f64::from(count.max(1))))
     }
 
     /// Returns the scenario with the values and deviations. `source` says where they come from.
@@ -382,16 +416,22 @@ impl Found {
         arm.link_length_m = parameters.link_length_m().map(|it| rounded(it) as f32);
         arm.height_m = rounded(parameters.get(Parameter::Height)) as f32;
         let joints = &self.joints.joints;
-        let value = |it: Estimate| rounded(it.value).max(0.0) as f32;
-        arm.coulomb_friction_nm = joints.map(|it| value(it.friction_nm));
-        arm.stiffness_nm_rad = joints.map(|it| value(it.stiffness_nm_rad));
+        for (joint, found) in joints.iter().enumerate() {
+            for (value, estimate) in [
+                (&mut arm.coulomb_friction_nm[joint], found.friction_nm),
+                (&mut arm.stiffness_nm_rad[joint], found.stiffness_nm_rad),
+            ] {
+                *value = better(*value, estimate);
+            }
+        }
         corrected.arm_model = Some(arm);
         let estimator = &mut corrected.controller.estimator;
         for (parameter, values_rad) in terms(&mut estimator.encoders) {
             *values_rad = [0, 1].map(|joint| rounded(parameters.get(parameter(joint))) as f32);
         }
-        estimator.tip_deviation_m = setting(self.identified.tip_deviation_m);
-        let ripple_m_s2 = self.ripple_m_s2(arm)?;
+        let deviation_m = libm::hypot(self.identified.tip_deviation_m, told_m(scenario));
+        estimator.tip_deviation_m = setting(deviation_m);
+        let ripple_m_s2 = self.ripple_m_s2;
         if let Some(LawSettings::Hybrid(law)) = corrected.controller.law.of_set() {
             let least = RIPPLES * ripple_m_s2 / f64::from(law.normal_force_n).max(1e-3);
             corrected.controller.governor.p_per_kg = rounded(least) as f32;
@@ -418,5 +458,108 @@ impl Found {
         };
         painleve_shared::settings::Settings::validate(&corrected)?;
         Ok(corrected)
+    }
+}
+
+/// Returns the ripple of [`Found::ripple_m_s2`].
+fn ripple_m_s2(slides: &[Slide], geometry: &Parameters, arm: &Arm<f64>, tick_hz: f64) -> f64 {
+    let mean_ticks = MEAN_S * tick_hz;
+    let (mut sum, mut count) = (0.0, 0_u32);
+    for slide in slides {
+        let touching = || {
+            slide
+                .readings
+                .iter()
+                .filter(|it| it.force_n[1] >= CONTACT_N)
+        };
+        let Some(first) = touching().next() else {
+            continue;
+        };
+        let since = |tick: u32, reading: &Reading| f64::from(reading.tick.wrapping_sub(tick));
+        let (mut mean_n, mut beginning) = (0.0, 0.0);
+        for reading in touching().take_while(|it| since(first.tick, it) < mean_ticks) {
+            mean_n += reading.force_n[1];
+            beginning += 1.0;
+        }
+        mean_n /= f64::max(beginning, 1.0);
+        let mut before = first.tick;
+        for reading in touching() {
+            let [tangential_n, normal_n] = reading.force_n;
+            let share = (since(before, reading) / mean_ticks).min(1.0);
+            before = reading.tick;
+            mean_n += share * (normal_n - mean_n);
+            let [first, elbow] =
+                [0, 1].map(|joint| joint_rad(geometry, joint, reading.encoders_rad[joint]));
+            let q = arm.inverse_tip_inertia(&Pose::new(&LinkMotion::new(first, first + elbow)));
+            let p = q.m22 + q.m12 * tangential_n / normal_n;
+            let off_m_s2 = p * (normal_n - mean_n);
+            sum += off_m_s2 * off_m_s2;
+            count += 1;
+        }
+    }
+    libm::sqrt(sum / f64::from(count.max(1)))
+}
+
+/// Returns the value found, unless it is known so badly that the one before is as good.
+fn better(before: f32, found: Estimate) -> f32 {
+    let larger = found.value.max(f64::from(before));
+    if found.deviation > BETTER * larger {
+        before
+    } else {
+        rounded(found.value).max(0.0) as f32
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_value_that_is_known_badly_does_not_replace_another() {
+        let found = |value, deviation| Estimate { value, deviation };
+        // No friction to speak of, where there was said to be some; then the other way round, and nothing known.
+        assert_eq!(better(0.05, found(0.001, 0.002)), 0.001);
+        assert_eq!(better(0.0, found(0.06, 0.004)), 0.06);
+        assert_eq!(better(0.05, found(0.3, 0.4)), 0.05);
+        assert_eq!(better(0.0, found(-0.01, 0.02)), 0.0);
+    }
+
+    #[test]
+    fn a_force_that_stays_the_same_has_no_ripple_whatever_it_is() {
+        let scenario = Scenario::default();
+        let geometry = prior(&scenario, &Drawn::default()).parameters;
+        let arm = Arm::new(scenario.arm).unwrap();
+        let ripple_m_s2 = |ripple_n: f64, ticks: usize| {
+            let readings = (0..3000_u32).step_by(ticks).map(|tick| Reading {
+                tick,
+                encoders_rad: [-0.5, 1.0],
+                force_n: [0.0, 12.0 + ripple_n * libm::sin(0.2 * f64::from(tick))],
+                torque_nm: [0.0; 2],
+            });
+            let slide = Slide {
+                posture: Posture::ElbowUp,
+                readings: readings.collect(),
+                whole: 3000,
+            };
+            super::ripple_m_s2(&[slide], &geometry, &arm, 1000.0)
+        };
+        assert!(ripple_m_s2(0.0, 1) < 1e-9);
+        let rippling = ripple_m_s2(1.0, 1);
+        assert!(rippling > 1.0, "{rippling}");
+        // Whether every tick arrives does not matter.
+        let sparse = ripple_m_s2(1.0, 4);
+        assert!(
+            (sparse / rippling - 1.0).abs() < 0.05,
+            "{sparse} {rippling}"
+        );
+    }
+
+    #[test]
+    fn only_an_arm_of_which_nothing_else_is_known_has_a_told_deviation() {
+        let told = "controller.estimator.tip_deviation_m=0.003".to_owned();
+        let mut scenario = Scenario::default().with_overrides("play", &[told]).unwrap();
+        assert!((told_m(&scenario) - 0.003).abs() < 1e-8);
+        suppose_drawn(&mut scenario);
+        assert_eq!(told_m(&scenario), 0.0);
     }
 }

@@ -23,12 +23,15 @@ const SETTLED: f64 = 1e-10;
 /// Rounds in which the noise is estimated.
 const ROUNDS: usize = 4;
 /// Deviation beyond which a point counts less, standard deviations.
-const FAR: f64 = 2.5;
+const OUTLYING: f64 = 2.5;
 /// Least noise, as a part of the assumed deviation.
 const LEAST_NOISE: f64 = 0.2;
-/// Largest |z_t| at which the tip has to be known, as a part of the reach.
-pub const NEEDED: f64 = 0.95;
-/// Number of places between −[`NEEDED`] and [`NEEDED`].
+/// Largest |z_t| at which the tip's distance from the edges counts, as a part of the reach: the governor's margin.
+const EDGE: f64 = 0.95;
+/// Largest |z_t| at which the tip's place has to be known, and to which slides should go, as a part of the reach. A tip is
+/// set down nearer, and the governor stops it before.
+pub const FAR: f64 = 0.85;
+/// Number of places between both ends.
 const PLACES: u32 = 39;
 
 /// The equation of one point.
@@ -117,10 +120,10 @@ impl Fit {
     fn cost(&self, points: &Points, prior: &Prior, parameters: &Parameters) -> f64 {
         let far = |deviation: f64| {
             let size = deviation.abs();
-            if size < FAR {
+            if size < OUTLYING {
                 size * size
             } else {
-                FAR * (2.0 * size - FAR)
+                OUTLYING * (2.0 * size - OUTLYING)
             }
         };
         let places = points.points.iter().map(|point| point.place(parameters));
@@ -141,7 +144,7 @@ impl Fit {
                 by: place.depth_by.component_mul(&prior.deviations) / deviation_m,
                 by_joint: place.depth_by_joint.map(|by| by / deviation_m),
                 off,
-                weight: (FAR / off.abs()).min(1.0),
+                weight: (OUTLYING / off.abs()).min(1.0),
             }
         })
     }
@@ -175,12 +178,13 @@ impl Fit {
         covariance: &Square,
     ) -> f64 {
         let (reach, reach_by) = reach_m(&self.parameters);
-        self.largest(postures, covariance, |place| {
+        self.largest(postures, covariance, EDGE, |place| {
             reach_by * (place.tip_t_m / reach) - place.tip_by
         })
     }
 
-    /// Returns the standard deviation of the tip's position, m, if link 1 has its length: the largest in these postures.
+    /// Returns the standard deviation of the tip's position, m, if link 1 has its length: the largest in these postures
+    /// within [`FAR`].
     pub fn place_deviation_m(
         &self,
         postures: impl Iterator<Item = Posture>,
@@ -189,13 +193,14 @@ impl Fit {
         let length = Parameter::Length.index();
         let column = covariance.column(length).into_owned();
         let given = covariance - column * column.transpose() / column[length].max(1e-300);
-        self.largest(postures, &given, |place| place.tip_by)
+        self.largest(postures, &given, FAR, |place| place.tip_by)
     }
 
     fn largest(
         &self,
         postures: impl Iterator<Item = Posture>,
         covariance: &Square,
+        farthest: f64,
         by: impl Fn(&Place) -> Values,
     ) -> f64 {
         let (reach, _) = reach_m(&self.parameters);
@@ -203,7 +208,7 @@ impl Fit {
         for posture in postures {
             for index in 0..PLACES {
                 let share = 2.0 * f64::from(index) / f64::from(PLACES - 1) - 1.0;
-                let tip_t_m = NEEDED * share * reach;
+                let tip_t_m = farthest * share * reach;
                 if let Some(place) = Place::on_belt(&self.parameters, posture, tip_t_m) {
                     let by = by(&place);
                     largest = largest.max(libm::sqrt(by.dot(&(covariance * by)).max(0.0)));
@@ -211,13 +216,6 @@ impl Fit {
             }
         }
         largest
-    }
-
-    /// Returns the covariance that there would be with less noise.
-    pub(crate) fn covariance_at_noise(&self, prior: &Prior, noise: f64) -> Square {
-        let gain = (self.noise / noise).max(1.0);
-        let of_points = self.information - Square::identity();
-        covariance(&(Square::identity() + of_points * (gain * gain)), prior)
     }
 
     /// Returns the covariance that there would be with further slides.

@@ -37,6 +37,8 @@ pub use refusal::{Missing, Refusal};
 /// Readings of one tick of a slide.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Reading {
+    /// Control tick; wraps. Ticks may be missing.
+    pub tick: u32,
     /// Angles by the encoders of θ1 and of the elbow, from their configured zeros, without any correction, rad.
     pub encoders_rad: [f64; 2],
     /// Contact force along and off the belt, f_t and f_n, N.
@@ -52,6 +54,8 @@ pub struct Slide {
     pub posture: Posture,
     /// Readings in order of time.
     pub readings: Vec<Reading>,
+    /// Number of readings that a whole slide has: more than there are if it ended early.
+    pub whole: usize,
 }
 
 impl Slide {
@@ -61,9 +65,10 @@ impl Slide {
         readings.filter(|it| it.force_n[1] >= limits.contact_n)
     }
 
-    /// Returns the share of the readings with the tip on the belt.
+    /// Returns the share of a whole slide's readings with the tip on the belt.
     pub fn share_on_belt(&self, limits: &Limits) -> f64 {
-        self.on_belt(limits).count() as f64 / self.readings.len().max(1) as f64
+        let whole = self.whole.max(self.readings.len()).max(1);
+        self.on_belt(limits).count() as f64 / whole as f64
     }
 }
 
@@ -74,7 +79,7 @@ pub struct Limits {
     pub count_rad: f64,
     /// Least normal force of a tip on the belt, N.
     pub contact_n: f64,
-    /// Largest standard deviation of the tip's position, m, apart from that by the measured length.
+    /// Largest standard deviation of the tip's position within [`FAR`](fit::FAR), m, apart from that by the measured length.
     pub tip_deviation_m: f64,
     /// Largest distance of the tip from a line, root mean square, m.
     pub off_line_m: f64,
@@ -96,7 +101,7 @@ impl Default for Limits {
         Self {
             count_rad: core::f64::consts::TAU / 16384.0,
             contact_n: 0.5,
-            tip_deviation_m: 0.6e-3,
+            tip_deviation_m: 0.5e-3,
             off_line_m: 0.15e-3,
         }
     }
@@ -111,7 +116,7 @@ pub struct Identified {
     /// slid in.
     pub tip_deviation_m: f64,
     /// Standard deviation of the tip's position along the belt, m, if link 1 has its length: the largest in these
-    /// postures.
+    /// postures within [`FAR`](fit::FAR).
     pub place_deviation_m: f64,
     /// Distance of the tip from the line, root mean square, m: with the parameters known before, and with these.
     pub off_line_m: [f64; 2],
@@ -136,7 +141,7 @@ pub fn identify(slides: &[Slide], prior: &Prior, limits: &Limits) -> Result<Iden
     verdict::check_line(&points, prior, limits, &fit, after)?;
     verdict::check_prior(&fit, prior)?;
     let ranges = points.ranges(&fit.parameters);
-    verdict::check_observed(&points, &ranges, &fit, prior, limits, after)?;
+    verdict::check_observed(&points, &ranges, &fit, prior, limits)?;
     let postures = || ranges.iter().map(|range| range.posture);
     Ok(Identified {
         tip_deviation_m: fit.tip_deviation_m(postures(), &fit.covariance),

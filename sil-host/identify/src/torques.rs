@@ -29,6 +29,12 @@ const MEAN_S: f64 = 0.1;
 /// turns slowly, waves and vibration of the belt reverse the friction.
 const LEAST_TURN_RAD: f64 = 9e-3;
 
+/// Largest distance of the readings' mean instant from the middle of the time over which they are averaged, as a part of it.
+const OFF_CENTRE: f64 = 0.02;
+
+/// Least share of a time's readings: the serial line carries one tick of four at the highest rate.
+const LEAST_SHARE: f64 = 0.1;
+
 /// Time over which a joint turns back if it vibrates, s: half a period of a belt that hangs softly.
 const BACK_S: f64 = 8e-3;
 
@@ -92,6 +98,8 @@ pub struct Joints {
 /// Means of readings over a short time.
 #[derive(Clone, Copy)]
 struct Mean {
+    /// Number of the time in the slide.
+    number: u32,
     joints_rad: Vector2<f64>,
     force_n: Vector2<f64>,
     torque_nm: Vector2<f64>,
@@ -119,22 +127,21 @@ impl Joints {
         limits: &Limits,
     ) -> Result<Self, OutOfRange> {
         let ticks = libm::round(MEAN_S * tick_hz).max(1.0);
-        let back_ticks = libm::round(BACK_S * tick_hz).max(1.0) as usize;
         let model = Model::new(known, ticks / tick_hz)?;
         let mut equations = Vec::new();
         let (mut square, mut count) = (0.0, 0.0);
         for slide in slides {
-            let means: Vec<Option<Mean>> = slide
-                .readings
-                .chunks_exact(ticks as usize)
-                .map(|readings| Mean::of(readings, back_ticks, geometry, limits))
+            let means: Vec<Mean> = stretches(&slide.readings, ticks as u32)
+                .filter_map(|(number, readings)| Mean::of(number, readings, geometry, limits))
                 .collect();
-            for mean in means.iter().flatten() {
+            for mean in &means {
                 square += mean.torque_nm.norm_squared();
                 count += 2.0;
             }
             for window in means.windows(3) {
-                if let [Some(before), Some(now), Some(after)] = window {
+                if let [before, now, after] = window
+                    && after.number == before.number.wrapping_add(2)
+                {
                     equations.extend(model.equations(before, now, after));
                 }
             }
@@ -202,11 +209,12 @@ impl Solution {
             covariance: SMatrix::from_diagonal(&deviations.component_mul(deviations)),
         };
         for _ in 0..ROUNDS {
-            let noise_nm = noise_nm(equations, &solution.unknowns);
+            let noise_nm = [0, 1].map(|joint| noise_nm(equations, joint, &solution.unknowns));
             // In deviations of what is known beforehand, so that one of zero is no special case.
             let mut information = SMatrix::<f64, COUNT, COUNT>::identity();
             let mut gradient = Values::zeros();
             for equation in equations {
+                let noise_nm = noise_nm[equation.joint];
                 let by = equation.by.component_mul(deviations) / noise_nm;
                 information += by * by.transpose();
                 gradient += by * (equation.left_over_nm / noise_nm);
@@ -239,28 +247,42 @@ impl Equation {
     }
 }
 
-/// Returns the noise of an equation, N·m, times the root of the number of neighbours that share an error.
-fn noise_nm(equations: &[Equation], unknowns: &Values) -> f64 {
-    let (mut sum, mut count, mut shared) = (0.0, 0, 1.0_f64);
-    for joint in 0..2 {
-        let of_joint = equations.iter().filter(|it| it.joint == joint);
-        let off: Vec<f64> = of_joint.map(|it| it.off_nm(unknowns)).collect();
-        sum += off.iter().map(|it| it * it).sum::<f64>();
-        count += off.len();
-        shared = shared.max(sharing(&off));
-    }
-    let freedom = count.saturating_sub(COUNT).max(1);
-    libm::sqrt(sum * shared / freedom as f64).max(f64::MIN_POSITIVE)
+/// Returns the noise of an equation of a joint, N·m, times the root of the number of neighbours that share an error.
+fn noise_nm(equations: &[Equation], joint: usize, unknowns: &Values) -> f64 {
+    let of_joint = equations.iter().filter(|it| it.joint == joint);
+    let off: Vec<f64> = of_joint.map(|it| it.off_nm(unknowns)).collect();
+    let sum = off.iter().map(|it| it * it).sum::<f64>();
+    // Both joints determine the unknowns that they share.
+    let freedom = off.len().saturating_sub(COUNT / 2).max(1);
+    libm::sqrt(sum * sharing(&off) / freedom as f64).max(f64::MIN_POSITIVE)
+}
+
+/// Splits readings into times of so many ticks, and numbers these. Leaves out times over which the readings are not spread
+/// evenly, because some are missing: their mean is that of another instant.
+fn stretches(readings: &[Reading], ticks: u32) -> impl Iterator<Item = (u32, &[Reading])> {
+    let first = readings.first().map_or(0, |reading| reading.tick);
+    let since = move |reading: &Reading| reading.tick.wrapping_sub(first);
+    readings
+        .chunk_by(move |one, other| since(one) / ticks == since(other) / ticks)
+        .filter_map(move |of_time| {
+            let number = since(of_time.first()?) / ticks;
+            let place = |reading: &Reading| f64::from(since(reading) % ticks);
+            let mean = of_time.iter().map(place).sum::<f64>() / of_time.len() as f64;
+            let off = (mean - 0.5 * f64::from(ticks - 1)).abs() / f64::from(ticks);
+            let share = of_time.len() as f64 / f64::from(ticks);
+            (off <= OFF_CENTRE && share >= LEAST_SHARE).then_some((number, of_time))
+        })
 }
 
 impl Mean {
-    /// Returns the means of readings, if the tip is on the belt in all of them.
+    /// Returns the means of the readings of a time, if the tip is on the belt in all of them.
     fn of(
+        number: u32,
         readings: &[Reading],
-        back_ticks: usize,
         geometry: &Parameters,
         limits: &Limits,
     ) -> Option<Self> {
+        let back = (BACK_S / MEAN_S * readings.len() as f64).round().max(1.0) as usize;
         let [mut encoders_rad, mut force_n, mut torque_nm] = [Vector2::zeros(); 3];
         for reading in readings {
             if reading.force_n[1] < limits.contact_n {
@@ -273,23 +295,24 @@ impl Mean {
         let share = 1.0 / readings.len() as f64;
         encoders_rad *= share;
         Some(Self {
+            number,
             joints_rad: Vector2::from([0, 1].map(|it| joint_rad(geometry, it, encoders_rad[it]))),
             force_n: force_n * share,
             torque_nm: torque_nm * share,
-            turns_back: [0, 1].map(|joint| turns_back(readings, joint, back_ticks)),
+            turns_back: [0, 1].map(|joint| turns_back(readings, joint, back)),
         })
     }
 }
 
-/// Returns whether a joint turns within `back_ticks` against the direction in which it turns as a whole.
-fn turns_back(readings: &[Reading], joint: usize, back_ticks: usize) -> bool {
+/// Returns whether a joint turns within `back` readings against the direction in which it turns as a whole.
+fn turns_back(readings: &[Reading], joint: usize, back: usize) -> bool {
     let turn_rad = |readings: &[Reading]| match readings {
         [from, .., to] => to.encoders_rad[joint] - from.encoders_rad[joint],
         _ => 0.0,
     };
     let direction = turn_rad(readings).signum();
     readings
-        .windows(back_ticks + 1)
+        .windows(back + 1)
         .any(|stretch| turn_rad(stretch) * direction < 0.0)
 }
 
@@ -373,5 +396,68 @@ impl Model {
                     left_over_nm: now.torque_nm[joint] - model_nm[joint],
                 }
             })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn times_are_those_of_the_ticks_whatever_is_lost() {
+        let start = u32::MAX - 50;
+        let kept = |keep: fn(u32) -> bool| -> Vec<(u32, usize)> {
+            let ticks = (0..500).filter(|tick| keep(*tick));
+            let readings: Vec<Reading> = ticks
+                .map(|tick| Reading {
+                    tick: start.wrapping_add(tick),
+                    encoders_rad: [0.0; 2],
+                    force_n: [0.0; 2],
+                    torque_nm: [0.0; 2],
+                })
+                .collect();
+            let times = stretches(&readings, 100).map(|(number, of_time)| (number, of_time.len()));
+            times.collect()
+        };
+        let all = |count| (0..5).map(|number| (number, count)).collect::<Vec<_>>();
+        assert_eq!(kept(|_| true), all(100));
+        assert_eq!(kept(|tick| tick % 4 == 0), all(25));
+        // Half of a time, a few readings, and none.
+        let lost = kept(|tick| !(130..180).contains(&tick) && (tick % 25 == 0 || tick < 300));
+        assert_eq!(lost, [(0, 100), (2, 100)]);
+        assert_eq!(
+            kept(|tick| tick / 100 != 1),
+            [0, 2, 3, 4].map(|it| (it, 100))
+        );
+    }
+
+    #[test]
+    fn a_joint_that_vibrates_does_not_blur_the_other() {
+        let equations: Vec<Equation> = (0..400)
+            .map(|index| {
+                let joint = index % 2;
+                let mut by = Values::zeros();
+                by[OF_JOINT * joint + FRICTION] = 1.0;
+                // No regular pattern.
+                let noise = libm::sin(f64::from(index as u32).powi(2));
+                Equation {
+                    joint,
+                    by,
+                    left_over_nm: 0.05 + [1e-4, 1e-2][joint] * noise,
+                }
+            })
+            .collect();
+        let solution = Solution::of(&equations, &Values::repeat(1.0));
+        let deviation = |joint: usize| {
+            let mut factors = Values::zeros();
+            factors[OF_JOINT * joint + FRICTION] = 1.0;
+            solution.sum(&factors).deviation
+        };
+        assert!(
+            deviation(0) < 0.02 * deviation(1),
+            "{} {}",
+            deviation(0),
+            deviation(1)
+        );
     }
 }

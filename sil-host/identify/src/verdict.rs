@@ -3,7 +3,7 @@
 use painleve_shared::Posture;
 
 use crate::Limits;
-use crate::fit::{Fit, Row, Square};
+use crate::fit::{FAR, Fit, Row, Square};
 use crate::geometry::{Range, reach_m};
 use crate::parameters::{Parameter, Prior, Values};
 use crate::passes::Points;
@@ -11,9 +11,6 @@ use crate::refusal::{Missing, Refusal};
 
 /// A model explains readings that another does not if it leaves less than this part over.
 const EXPLAINS: f64 = 0.7;
-
-/// Noise of a healthy arm on an even belt: beyond it, further slides are not what is missing.
-const USUAL_NOISE: f64 = 3.0;
 
 /// Part of what is left over that a slip has to explain.
 const SLIPPED: f64 = 0.7;
@@ -29,9 +26,6 @@ const SLIP_COUNTS: f64 = 4.0;
 
 /// Largest deviation from what is known beforehand, standard deviations.
 const BELIEVED: f64 = 4.0;
-
-/// Where a further slide should go, as a part of the reach.
-const FAR: f64 = 0.85;
 
 /// Least distance of the stretch to slide along from that slid along, as a part of the reach, to be told.
 const FARTHER: f64 = 0.02;
@@ -169,19 +163,12 @@ pub(crate) fn check_observed(
     fit: &Fit,
     prior: &Prior,
     limits: &Limits,
-    off_line_m: f64,
 ) -> Result<(), Refusal> {
     let postures = || ranges.iter().map(|range| range.posture);
     let deviation_m = |covariance: &Square| fit.place_deviation_m(postures(), covariance);
     let now_m = deviation_m(&fit.covariance);
     if now_m <= limits.tip_deviation_m {
         return Ok(());
-    }
-    if deviation_m(&fit.covariance_at_noise(prior, USUAL_NOISE)) <= limits.tip_deviation_m {
-        return Err(Refusal::NotALine {
-            off_mm: 1e3 * off_line_m,
-            most_mm: 1e3 * off_line_m * USUAL_NOISE / fit.noise,
-        });
     }
     let (reach, _) = reach_m(&fit.parameters);
     let mut candidates = Vec::new();

@@ -5,12 +5,11 @@ use std::time::{Duration, Instant};
 
 use painleve_board::arm::{ArmEvent, ConnectedArm};
 use painleve_commission::elbow_side;
-use painleve_commission::identification::{SlideRig, SlideTick};
+use painleve_commission::identification::{Slid, SlideRig};
 use painleve_plant::scenario::Scenario;
 use painleve_process::interrupt::Interrupt;
 use painleve_process::terminal::warn;
 use painleve_shared::Posture;
-use painleve_shared::frame::StatusFlags;
 use painleve_shared::message::FrameSource;
 use painleve_shared::status::{Fault, SupervisorState};
 
@@ -43,50 +42,47 @@ impl BoardSlides {
         })
     }
 
-    fn check(&self) -> Result<bool, BoardRigError> {
+    /// Returns what the board says next, if it says something soon and no signal has arrived.
+    fn next_event(&self, arm: &mut ConnectedArm) -> Result<Option<ArmEvent>, BoardRigError> {
         if self.interrupt.is_requested() {
             return Err(BoardRigError::Interrupted);
         }
-        Ok(self.operator.confirms()?)
+        Ok(arm.next_event(PATIENCE)?)
     }
 
     /// Collects the ticks of one slide.
-    fn ticks(
-        &self,
-        arm: &mut ConnectedArm,
-        duration: Duration,
-    ) -> Result<Vec<SlideTick>, BoardRigError> {
+    fn slid(&self, arm: &mut ConnectedArm, duration: Duration) -> Result<Slid, BoardRigError> {
         let start = Instant::now();
-        let mut ticks = Vec::new();
-        while start.elapsed() < duration + LIMIT {
-            self.check()?;
-            let Some(ArmEvent::Tick { sensor, answer }) = arm.next_event(PATIENCE)? else {
+        let limit = duration + LIMIT;
+        let mut slid = Slid::default();
+        while start.elapsed() < limit {
+            self.operator.attend()?;
+            let Some(ArmEvent::Tick { sensor, answer }) = self.next_event(arm)? else {
                 continue;
             };
             match answer.latched_fault() {
                 None => {}
                 Some(Fault::LiftOffTooLong | Fault::RecoveryFailed) => {
                     warn("the tip has left the belt");
-                    return Ok(ticks);
+                    return Ok(slid);
                 }
                 Some(fault) => return Err(BoardRigError::Faulted(fault)),
             }
-            let is_tracking = answer.supervisor_state() == Some(SupervisorState::Tracking);
-            ticks.extend(sensor.filter(|_| is_tracking).map(|sensor| SlideTick {
-                sensor,
-                torques: answer.torques,
-            }));
-            if is_tracking && answer.flags.contains(StatusFlags::REFERENCE_DONE) {
-                return Ok(ticks);
+            let Some(sensor) = sensor else {
+                continue;
+            };
+            slid.push(sensor, &answer);
+            if slid.is_complete {
+                return Ok(slid);
             }
-            if !ticks.is_empty() && answer.supervisor_state() == Some(SupervisorState::Idle) {
+            if !slid.ticks.is_empty() && answer.supervisor_state() == Some(SupervisorState::Idle) {
                 return Err(BoardRigError::Off);
             }
         }
-        Err(if ticks.is_empty() {
-            BoardRigError::NotEnabled(duration + LIMIT)
+        Err(if slid.ticks.is_empty() {
+            BoardRigError::NotEnabled(limit)
         } else {
-            BoardRigError::NotEnded(duration + LIMIT)
+            BoardRigError::NotEnded(limit)
         })
     }
 }
@@ -94,13 +90,11 @@ impl BoardSlides {
 impl SlideRig for BoardSlides {
     type Error = BoardRigError;
 
-    fn slide(
-        &mut self,
-        scenario: &Scenario,
-        posture: Posture,
-    ) -> Result<Vec<SlideTick>, BoardRigError> {
+    fn slide(&mut self, scenario: &Scenario, posture: Posture) -> Result<Slid, BoardRigError> {
         let configuration = scenario.controller_configuration();
         let mut arm = ConnectedArm::open(&self.port, &configuration, FrameSource::Sensors)?;
+        // What was typed before confirms no task.
+        self.operator.attend()?;
         let speed_m_s = scenario.belt.profile.speed_m_s(0.0);
         warn(format_args!(
             "operator: let the belt run towards {}t, at about {:.2} m/s; hold the arm with its tip on the belt right below \
@@ -109,19 +103,21 @@ impl SlideRig for BoardSlides {
             speed_m_s.abs(),
             elbow_side(posture)
         ));
-        while !self.check()? {
-            arm.next_event(PATIENCE)?;
+        while !self.operator.confirms()? {
+            self.next_event(&mut arm)?;
         }
         arm.permit_arming(true)?;
         warn(
-            "operator: open the switch ENABLE, then close it, and let go when the drive takes the arm over",
+            "operator: open the switch ENABLE, then close it, and let go when the drive takes the arm over; when the slide ends, \
+             the torque goes off: be ready to hold the arm, and stop the belt",
         );
         let duration = Duration::from_secs_f64(scenario.run.duration_s);
-        let ticks = self.ticks(&mut arm, duration);
+        let slid = self.slid(&mut arm, duration);
         // Whatever ended the slide, the torque is off.
         let stopped = arm.stop();
-        let ticks = ticks?;
+        warn("operator: the torque is off; hold the arm, and stop the belt");
+        let slid = slid?;
         stopped?;
-        Ok(ticks)
+        Ok(slid)
     }
 }

@@ -27,8 +27,11 @@ const COLUMNS: [&str; 6] = [
     "actuator.u2_counts",
 ];
 
-/// Column with the supervisor's state, and the state in which a slide counts. A table without it counts as a whole.
-const STATE: (&str, &str) = ("actuator.state", "tracking");
+/// Column with the control tick; the rows of a table without it are counted.
+const TICK: &str = "sensor.tick";
+
+/// Column with the supervisor's state, and the states in which a slide counts. A table without it counts as a whole.
+const STATE: (&str, [&str; 2]) = ("actuator.state", ["tracking", "lift-off"]);
 
 /// A recorded slide.
 #[derive(Clone, Debug)]
@@ -64,6 +67,7 @@ impl Recorded {
         })?;
         Ok(Slide {
             posture: self.posture.into(),
+            whole: ticks.len(),
             readings: readings(scenario, ticks),
         })
     }
@@ -91,14 +95,20 @@ fn of_table(table: impl Read) -> Result<Vec<SlideTick>, String> {
     for (at, name) in places.iter_mut().zip(COLUMNS) {
         *at = place(name).ok_or_else(|| format!("it has no column {name}"))?;
     }
-    let (state, tracking) = STATE;
-    let state = place(state);
+    let (state, counted) = STATE;
+    let (state, tick) = (place(state), place(TICK));
     let mut ticks = Vec::new();
-    for row in reader.records() {
+    for (number, row) in (0_u32..).zip(reader.records()) {
         let row = row.map_err(|error| error.to_string())?;
-        if state.is_some_and(|at| row.get(at) != Some(tracking)) {
+        if state.is_some_and(|at| row.get(at).is_none_or(|it| !counted.contains(&it))) {
             continue;
         }
+        let tick = match tick.and_then(|at| row.get(at)) {
+            Some(text) => text
+                .parse()
+                .map_err(|_| format!("{TICK} = {text:?} is not a whole number"))?,
+            None => number,
+        };
         let mut counts = [0_i64; COLUMNS.len()];
         for (value, (at, name)) in counts.iter_mut().zip(places.into_iter().zip(COLUMNS)) {
             let text = row.get(at).unwrap_or_default();
@@ -113,6 +123,7 @@ fn of_table(table: impl Read) -> Result<Vec<SlideTick>, String> {
         let torque = |counts| TorqueCounts(i32::try_from(counts).unwrap_or(i32::MAX));
         ticks.push(SlideTick {
             sensor: SensorFrame {
+                tick,
                 joints: [joint(joint_1), joint(joint_2)],
                 tangential_force: force(tangential),
                 normal_force: force(normal),
@@ -129,13 +140,15 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_table_gives_the_frames_of_the_ticks_that_track() {
+    fn a_table_gives_the_frames_of_the_ticks_that_track_or_have_lost_the_belt() {
         let table = "time_s,sensor.joint1_counts,sensor.joint2_counts,sensor.tangential_force_counts,sensor.normal_force_counts,\
-                     actuator.u1_counts,actuator.u2_counts,actuator.state\n0,1,2,3,7,1,1,armed\n0.001,4,5,8,-6,9,-3,tracking\n";
+                     actuator.u1_counts,actuator.u2_counts,actuator.state,sensor.tick\n0,1,2,3,7,1,1,armed,70\n\
+                     0.001,4,5,8,-6,9,-3,tracking,71\n0.003,6,5,0,0,9,-3,lift-off,73\n";
         let ticks = of_table(table.as_bytes()).unwrap();
-        let [SlideTick { sensor, torques }] = ticks[..] else {
+        let [SlideTick { sensor, torques }, lost] = ticks[..] else {
             panic!("{ticks:?}");
         };
+        assert_eq!([sensor.tick, lost.sensor.tick], [71, 73]);
         assert_eq!(sensor.joints, [EncoderCounts(4), EncoderCounts(5)]);
         assert_eq!(sensor.tangential_force, ForceCounts(8));
         assert_eq!(sensor.normal_force, ForceCounts(-6));

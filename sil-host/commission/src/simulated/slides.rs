@@ -3,15 +3,14 @@
 use painleve_plant::mechanics::BuiltInPlant;
 use painleve_plant::scenario::{BeltSettings, InitialState, RunSettings, Scenario};
 use painleve_plant::simulation::Simulation;
-use painleve_plant::{Controller, Plant};
+use painleve_plant::{Controller, Event, Plant, Probe, State, Step};
 use painleve_shared::counts::EncoderCounts;
 use painleve_shared::frame::{ActuatorFrame, SensorFrame};
-use painleve_shared::status::SupervisorState;
 use painleve_shared::{Arm, OutOfRange, Posture};
 use strum::{EnumString, IntoStaticStr, VariantArray};
 
 use super::SimulatedError;
-use crate::identification::{SlideRig, SlideTick};
+use crate::identification::{Slid, SlideRig};
 
 /// A mistake that a geometry cannot describe.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, EnumString, IntoStaticStr, VariantArray)]
@@ -52,8 +51,21 @@ pub struct SimulatedSlides<P = BuiltInPlant> {
     slides: u32,
     /// Time that the arm moved, s.
     pub time_s: f64,
-    /// Largest normal force while the drive was tracking, N. Before, the arm rests on the belt with its weight and springs.
+    /// Largest normal force from the first tick that tracks, N, in the steps of the plant: impacts count. Before, the arm
+    /// rests on the belt with its weight and springs.
     pub largest_force_n: f64,
+}
+
+/// Largest normal force at the steps of a plant, N.
+struct LargestForce(f64);
+
+impl Probe for LargestForce {
+    fn step(&mut self, step: &impl Step) {
+        let Self(largest_n) = self;
+        *largest_n = largest_n.max(step.end().normal_force_n);
+    }
+
+    fn event(&mut self, _: f64, _: Event, _: &State) {}
 }
 
 impl SimulatedSlides {
@@ -104,11 +116,7 @@ impl<P: Plant> SimulatedSlides<P> {
 impl<P: Plant> SlideRig for SimulatedSlides<P> {
     type Error = SimulatedError;
 
-    fn slide(
-        &mut self,
-        scenario: &Scenario,
-        posture: Posture,
-    ) -> Result<Vec<SlideTick>, SimulatedError> {
+    fn slide(&mut self, scenario: &Scenario, posture: Posture) -> Result<Slid, SimulatedError> {
         self.slides += 1;
         let posture = match self.mistake {
             Some(GeometryMistake::SamePosture) => Posture::ElbowDown,
@@ -135,7 +143,7 @@ impl<P: Plant> SlideRig for SimulatedSlides<P> {
         };
         let mut simulation = Simulation::of((self.plant_of)(&slid)?, &slid)?;
         let mut controller = Controller::new(&slid.controller_configuration())?;
-        let mut slid_ticks = Vec::new();
+        let mut slide = Slid::default();
         let ticks = slid.run.ticks();
         for tick in 0..ticks {
             let frame = self.mistaken(simulation.sample(&mut ())?, tick as f64 / ticks as f64);
@@ -143,17 +151,14 @@ impl<P: Plant> SlideRig for SimulatedSlides<P> {
             if answer.latched_fault().is_some() {
                 break;
             }
-            if answer.supervisor_state() == Some(SupervisorState::Tracking) {
-                slid_ticks.push(SlideTick {
-                    sensor: frame,
-                    torques: answer.torques,
-                });
-                let force_n = simulation.plant().snapshot().normal_force_n;
-                self.largest_force_n = self.largest_force_n.max(force_n);
+            slide.push(frame, &answer);
+            let mut force = LargestForce(0.0);
+            simulation.advance(Some(&answer), &mut force)?;
+            if !slide.ticks.is_empty() {
+                self.largest_force_n = self.largest_force_n.max(force.0);
             }
-            simulation.advance(Some(&answer), &mut ())?;
         }
         self.time_s += slid.run.duration_s;
-        Ok(slid_ticks)
+        Ok(slide)
     }
 }

@@ -1,5 +1,6 @@
 //! Random arms and their slides, with rounding, noise, an uneven belt and errors that the identification does not know.
 
+use painleve_identify::fit::FAR;
 use painleve_identify::geometry::{Place, encoder_rad, joint_rad};
 use painleve_identify::parameters::Drawn;
 use painleve_identify::{Limits, Parameter, Parameters, Prior, Reading, Slide};
@@ -61,6 +62,33 @@ impl Rig {
         }
     }
 
+    /// Draws an arm from what is known of it beforehand, with a link 1 that is known exactly.
+    pub fn of_prior(seed: u64) -> Self {
+        let known = Self::new(seed);
+        let exactly = Drawn {
+            length: 1e-6,
+            ..Drawn::default()
+        };
+        let prior = exactly.prior(known.prior.parameters);
+        let mut generator = known.generator;
+        // A sum of twelve is nearly normal.
+        let mut draw = || {
+            (0..12)
+                .map(|_| generator.random_range(-0.5..0.5))
+                .sum::<f64>()
+        };
+        let mut actual = prior.parameters;
+        for (value, deviation) in actual.0.iter_mut().zip(&prior.deviations) {
+            *value += deviation * draw();
+        }
+        Self {
+            actual,
+            prior,
+            waves_m: 0.0,
+            generator,
+        }
+    }
+
     /// Slides to and fro between these parts of the reach.
     pub fn slide(&mut self, posture: Posture, from: f64, to: f64) -> Slide {
         let (reach, _) = painleve_identify::geometry::reach_m(&self.actual);
@@ -69,11 +97,16 @@ impl Rig {
         let places: Vec<f64> = there.clone().chain(there.rev()).collect();
         let readings = places.into_iter().enumerate().map(|(tick, tip)| {
             let raised_m = self.waves_m * (WAVE_RAD_PER_TICK * tick as f64).sin();
-            self.reading(posture, tip, raised_m)
+            Reading {
+                tick: tick as u32,
+                ..self.reading(posture, tip, raised_m)
+            }
         });
+        let readings: Vec<Reading> = readings.collect();
         Slide {
             posture,
-            readings: readings.collect(),
+            whole: readings.len(),
+            readings,
         }
     }
 
@@ -90,6 +123,7 @@ impl Rig {
             ((angle + noise) / COUNT_RAD).round() * COUNT_RAD
         });
         Reading {
+            tick: 0,
             encoders_rad: rounded,
             force_n: [0.0, 4.0 + self.generator.random_range(-0.3..0.3)],
             torque_nm: [0.0; 2],
@@ -104,18 +138,22 @@ impl Rig {
         ]
     }
 
-    /// Returns the largest error of the tip's position by other parameters over the working stretch, m.
+    /// Returns the largest error of the tip's position by other parameters over the stretch in which it has to be known, m.
     pub fn tip_error_m(&self, found: &Parameters) -> f64 {
         let (reach, _) = painleve_identify::geometry::reach_m(&self.actual);
         let mut largest = 0.0_f64;
         for posture in [Posture::ElbowDown, Posture::ElbowUp] {
-            for step in -36..=36 {
-                let tip = f64::from(step) / 40.0 * reach;
-                let encoders = angles(&self.actual, posture, tip);
-                largest = largest.max((Place::at(found, encoders).tip_t_m - tip).abs());
+            for step in -20..=20 {
+                let tip = f64::from(step) / 20.0 * FAR * reach;
+                largest = largest.max((self.place(found, posture, tip).tip_t_m - tip).abs());
             }
         }
         largest
+    }
+
+    /// Returns the arm by other parameters, where the tip is at z_t on the belt, m.
+    pub fn place(&self, found: &Parameters, posture: Posture, tip_t_m: f64) -> Place {
+        Place::at(found, angles(&self.actual, posture, tip_t_m))
     }
 }
 

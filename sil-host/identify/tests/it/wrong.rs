@@ -96,7 +96,13 @@ fn a_tip_that_is_not_on_the_belt_is_refused() {
                 *reading = rig.reading(Posture::ElbowDown, 0.1 - 0.4 * (0.5 - share), raised);
             }
         },
-        |refusal| matches!(refusal, Refusal::NotALine { .. } | Refusal::Slipped { .. }),
+        // The encoders' errors explain it, so that only a farther slide would show it.
+        |refusal| {
+            matches!(
+                refusal,
+                Refusal::NotALine { .. } | Refusal::Slipped { .. } | Refusal::NotObserved { .. }
+            )
+        },
     );
     assert!(missed.is_empty(), "{missed:#?}");
     let missed = self::missed(
