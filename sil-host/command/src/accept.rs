@@ -8,6 +8,7 @@ use painleve_board::Serial;
 use painleve_files::atomic_file::{commit_all, prepare};
 use painleve_process::terminal::warn;
 
+use super::output::warn_of_earlier;
 use super::output_error::output;
 use super::{CommandError, distinct_files, say};
 
@@ -33,8 +34,10 @@ pub fn run(arguments: &AcceptArguments) -> Result<(), CommandError> {
     let page = &arguments.output;
     let object = page.with_extension("json");
     distinct_files::check(&[("--output", page), ("--output", &object)])?;
-    let board = Serial::connect(&arguments.port)?;
-    let acceptance = accept(board, tell).map_err(|error| match error {
+    let warn_of_earlier = || warn_of_earlier(&[page, &object]);
+    let board = Serial::connect(&arguments.port).inspect_err(|_| warn_of_earlier())?;
+    let accepted = accept(board, tell).inspect_err(|_| warn_of_earlier());
+    let acceptance = accepted.map_err(|error| match error {
         AcceptError::Board(error) => CommandError::Board(error),
         AcceptError::Stored => CommandError::Accept(error),
     })?;

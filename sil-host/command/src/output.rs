@@ -1,5 +1,7 @@
 //! The output files of a run, written while it runs.
 
+use std::path::Path;
+
 use clap::Args;
 use clap::builder::TypedValueParser as _;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
@@ -185,6 +187,16 @@ impl Output {
             recorder.finish().map_err(output)?;
         }
         Ok(self.paths)
+    }
+}
+
+/// Tells, after a failure, which results of an earlier run are still there.
+pub fn warn_of_earlier(paths: &[&Path]) {
+    for path in paths.iter().filter(|path| path.exists()) {
+        warn(format_args!(
+            "{} is still that of an earlier run",
+            path.display()
+        ));
     }
 }
 

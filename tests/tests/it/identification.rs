@@ -95,15 +95,18 @@ fn records_of_slides_show_an_arm() {
         let error_nm = friction_nm(&found, joint) - FRICTION_NM;
         assert!(error_nm.abs() < 0.06 * FRICTION_NM, "{joint}: {found}");
     }
-    // Told the wrong posture, it writes nothing.
-    std::fs::remove_file(bench.path("out/identified.toml")).unwrap();
+    // Told the wrong posture, it writes nothing, and says that the files are not of this run.
+    let before = std::fs::read(bench.path("out/identified.toml")).unwrap();
     let swapped = ["elbow-up=elbow-down.mcap", "elbow-down=up.csv"];
     let refused = bench.run(&["identify", "--slide", swapped[0], "--slide", swapped[1]]);
     assert_eq!(code(refused.status), 1, "{}", errors(&refused));
-    assert!(
-        errors(&refused).contains("not as told"),
-        "{}",
-        errors(&refused)
-    );
-    assert!(!bench.path("out/identified.toml").exists());
+    for part in [
+        "not as told",
+        "out/identified.toml is still that of an earlier run",
+        "out/identified.html is still that of an earlier run",
+    ] {
+        assert!(errors(&refused).contains(part), "{}", errors(&refused));
+    }
+    let after = std::fs::read(bench.path("out/identified.toml")).unwrap();
+    assert_eq!(before, after);
 }

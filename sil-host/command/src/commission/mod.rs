@@ -18,6 +18,7 @@ use serde_json::json;
 use self::board_rig::BoardRig;
 pub use self::board_rig::BoardRigError;
 use self::rehearsal::Rehearsal;
+use super::output::warn_of_earlier;
 use super::output_error::output;
 use super::{CommandError, distinct_files, say};
 
@@ -100,6 +101,7 @@ pub fn run(arguments: &CommissionArguments) -> Result<(), CommandError> {
         None => rehearse(arguments, &scenario, &expected),
         Some(port) => on_board(port, &scenario, &expected),
     }
+    .inspect_err(|_| warn_of_earlier(&[&arguments.output]))
     .map_err(|error| match error {
         CommissionError::Rig(error) => error,
         CommissionError::Refused(mistake) => CommandError::Mounting(mistake),

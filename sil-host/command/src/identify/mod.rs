@@ -25,6 +25,7 @@ use serde_json::json;
 use self::board_slides::BoardSlides;
 use self::recorded::Recorded;
 use super::drive::check_rate;
+use super::output::warn_of_earlier;
 use super::output_error::output;
 use super::{CommandError, distinct_files, say};
 
@@ -99,7 +100,9 @@ pub fn run(arguments: &IdentifyArguments) -> Result<(), CommandError> {
         scenario.arm_model = Some(arm);
         drawn.length = MEASURED_M / length_m;
     }
-    let (found, source) = found(arguments, &slides, &scenario, &drawn)?;
+    let found = found(arguments, &slides, &scenario, &drawn);
+    let (found, source) =
+        found.inspect_err(|_| warn_of_earlier(&[&arguments.output, &arguments.html]))?;
     warn_of_change(&scenario, &found);
     let identified = found
         .applied_to(&scenario, &source)

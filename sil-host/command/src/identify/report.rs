@@ -91,6 +91,8 @@ fn sentences(found: &Found) -> [String; 3] {
     let identified = &found.identified;
     let [off_before_m, off_after_m] = identified.off_line_m;
     let [left_before_nm, left_after_nm] = found.joints.left_over_nm;
+    let length = identified.fit.parameters.get(Parameter::Length);
+    let length_deviation = identified.fit.deviation(Parameter::Length) / length;
     [
         format!(
             "The tip stays on a line to {:.3} mm (by the values before: {:.2} mm), in {} readings.",
@@ -99,8 +101,10 @@ fn sentences(found: &Found) -> [String; 3] {
             identified.readings
         ),
         format!(
-            "Its position is known to {:.2} mm, its distance from the edges to {:.2} mm (before: {:.1} mm).",
+            "Its position is known to {:.2} mm plus {:.2} %, as link 1 has been measured; its distance from the edges to {:.2} mm \
+             (before: {:.1} mm).",
             1e3 * identified.place_deviation_m,
+            100.0 * length_deviation,
             1e3 * identified.tip_deviation_m,
             1e3 * found.prior.tip_deviation_m()
         ),
