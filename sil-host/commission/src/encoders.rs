@@ -4,7 +4,7 @@
 //! From the first pose to the second, joint 1 turns by +90° and the elbow by −90°; from the second to the
 //! third, only the elbow, by −90°. This identifies the encoders and their directions.
 
-use painleve_firmware::estimate::encoder_correction::{EncoderCorrection, EncoderCorrector};
+use painleve_firmware::estimate::encoder_correction::EncoderCorrection;
 use painleve_shared::JointTorque;
 use painleve_shared::counts::{EncoderCounts, EncoderScale, ForceCounts};
 use painleve_shared::{JointMotion, Pose};
@@ -135,13 +135,12 @@ fn zero(
     correction: &EncoderCorrection,
     held: &[MeanReadings],
 ) -> EncoderCounts {
-    let corrector = EncoderCorrector::new(correction);
     let zeros = held.iter().zip(POSES_DEG).map(|(held, [one, two])| {
         // The belt's inward normal is not plumb if the belt is tilted; the elbow's angle does not change.
         let joints_rad = [one.to_radians() - belt_tilt_rad, (two - one).to_radians()];
         let [one_rad, elbow_rad] = joints_rad.map(|it| it as f32);
         let pose = Pose::new(&JointMotion::new(one_rad, elbow_rad).to_links());
-        let added_rad = corrector.in_pose(&pose).unwrap_or_default().to_array()[joint];
+        let added_rad = correction.in_pose(&pose).to_array()[joint];
         let encoder_rad = joints_rad[joint] - f64::from(added_rad);
         let angle = (encoder_rad / scale.rad_per_count::<f64>()).round() as i32;
         let reading = forward(scale, held.joints[joint], reversed);

@@ -1,9 +1,9 @@
 //! A session with a rig: mean readings, in the units and directions found so far.
 
 use nalgebra::Vector2;
-use painleve_firmware::estimate::encoder_correction::{EncoderCorrection, EncoderCorrector};
+use painleve_firmware::estimate::encoder_correction::EncoderCorrection;
 use painleve_shared::counts::{EncoderCounts, EncoderScale, ForceCounts, TorqueCounts};
-use painleve_shared::{JointMotion, JointTorque, LinkMotion};
+use painleve_shared::{JointMotion, JointTorque, LinkMotion, Pose};
 
 use crate::{CommissionError, Expected, Mistake, RawReadings, Rig};
 
@@ -28,7 +28,7 @@ pub(crate) struct Session<'a, R> {
     pub expected: &'a Expected,
     reversed: [bool; 2],
     offsets: [u32; 2],
-    corrector: EncoderCorrector,
+    correction: EncoderCorrection,
     stage_reversed: [bool; 2],
 }
 
@@ -39,7 +39,7 @@ impl<'a, R: Rig> Session<'a, R> {
             expected,
             reversed: [false; 2],
             offsets: [0; 2],
-            corrector: EncoderCorrector::new(&EncoderCorrection::default()),
+            correction: EncoderCorrection::default(),
             stage_reversed: [false; 2],
         }
     }
@@ -53,7 +53,7 @@ impl<'a, R: Rig> Session<'a, R> {
     ) {
         self.reversed = reversed;
         self.offsets = offsets;
-        self.corrector = EncoderCorrector::new(&correction);
+        self.correction = correction;
     }
 
     /// Uses these polarities from now on.
@@ -170,11 +170,15 @@ impl<'a, R: Rig> Session<'a, R> {
             angles[joint] =
                 f64::from(scale.counts_from_zero(forward)) * scale.rad_per_count::<f64>();
         }
-        let corrections_rad = self.corrector.at(angles.map(|angle| angle as f32));
-        for (angle, correction_rad) in angles.iter_mut().zip(corrections_rad) {
-            *angle += f64::from(correction_rad);
+        let encoders_rad = JointMotion::from_array(angles.map(|angle| angle as f32));
+        // As the board starts, and once more: a correction changes by a seventeenth of the angle's error at most.
+        let mut added_rad = JointMotion::from_array(self.correction.zero_rad);
+        for _ in 0..2 {
+            let near_rad = encoders_rad + added_rad;
+            added_rad = self.correction.in_pose(&Pose::new(&near_rad.to_links()));
         }
-        Some(JointMotion::new(angles[0], angles[1]).to_links())
+        let added_rad = added_rad.to_array().map(f64::from);
+        Some(JointMotion::new(angles[0] + added_rad[0], angles[1] + added_rad[1]).to_links())
     }
 
     /// Returns raw forces minus the tare, N, as (f_t, f_n) in the cell's directions.
