@@ -45,6 +45,10 @@ const ROUNDS: [f64; 2] = [0.6, 0.93];
 /// Least p of a slide, 1/kg: where a belt's vibration of 5 m/s² takes a fifth of the force.
 const LEAST_P_PER_KG: f64 = 6.0;
 
+/// Speed at which a tip that has left the belt is lowered onto it in the second round, m/s: on a belt that hangs, a faster tip
+/// bounces off again and again. In the first round the belt may be farther off than that finds in time.
+const LANDING_M_S: f32 = 0.005;
+
 /// Speed of the belt in a slide, m/s. Waves and seam shake a tip with the square of the speed.
 const BELT_M_S: f64 = 0.15;
 
@@ -345,7 +349,9 @@ pub fn identify_arm<R: SlideRig>(
     let slid = slide(&known, near, [first, first.mirrored()])?;
     let identified = identify(&slid, &prior, &limits.of_first_look())?;
     let known = Found::new(identified, prior, &slid, scenario)?;
-    let known = known.applied_to(scenario, "first look")?;
+    let mut known = known.applied_to(scenario, "first look")?;
+    let landing_m_s = &mut known.controller.recovery.landing_speed_m_s;
+    *landing_m_s = landing_m_s.min(LANDING_M_S);
     // The elbow stays as it is.
     let slid = slide(&known, far, [first.mirrored(), first])?;
     let identified = identify(&slid, &prior, &limits)?;

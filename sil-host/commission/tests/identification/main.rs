@@ -258,8 +258,8 @@ fn encoders_on_motors_are_read_without_the_twist_of_the_gears() {
 /// Joints that turn to and fro show less friction than they have.
 #[test]
 fn joints_that_vibrate_do_not_pass_for_joints_with_less_friction() {
-    // Of 20 such arms one is refused: its tip is thrown.
-    for seed in [51_001, 51_002, 51_004] {
+    // Lowered at 20 mm/s, the tip of the first one bounces, and is thrown with 126 N.
+    for seed in [51_003, 51_001, 51_002, 51_004] {
         let scenario = Scenario::default();
         let mut actual = imperfect(&scenario, seed).unwrap();
         actual.effects.hanging_belt.mass_kg = 0.02;
@@ -267,6 +267,7 @@ fn joints_that_vibrate_do_not_pass_for_joints_with_less_friction() {
         let mut rig = SimulatedSlides::new(actual.clone(), None);
         let found = identify_arm(&mut rig, &scenario, &drawn()).unwrap();
         assert_joints_found(&actual, &found.joints);
+        assert!(rig.largest_force_n < 15.0, "{}", rig.largest_force_n);
     }
 }
 
