@@ -59,6 +59,7 @@ fn the_page_of_a_run_plays_zooms_and_has_no_error() {
 }
 
 #[test]
+#[ignore = "needs a browser"]
 fn a_live_run_is_watched_paused_stepped_set_pushed_and_reset() {
     watch_live(&Bench::new("live"), &[], "live.mjs");
 }
@@ -70,6 +71,7 @@ fn watch_live(bench: &Bench, arguments: &[&str], script: &str) {
 }
 
 #[test]
+#[ignore = "needs a browser"]
 fn a_higher_friction_throws_the_tip_off_while_the_run_is_watched() {
     let bench = Bench::new("live-friction");
     let set = ["open-loop-bounce", "--set", "belt.friction=0.3"];
@@ -77,6 +79,7 @@ fn a_higher_friction_throws_the_tip_off_while_the_run_is_watched() {
 }
 
 #[test]
+#[ignore = "needs a browser"]
 fn a_page_without_pictures_or_connection_and_one_too_many_lose_nothing_that_matters() {
     let bench = Bench::new("live-adversity");
     watch_live(&bench, &["open-loop-bounce"], "adversity.mjs");

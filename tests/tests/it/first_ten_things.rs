@@ -105,6 +105,7 @@ fn foxglove_can_read_every_message_of_the_record() {
 }
 
 #[test]
+#[ignore = "needs Python packages of the network"]
 fn pandas_reads_and_plots_a_run() {
     let Some(python) = python("pandas", &["pandas", "matplotlib"]) else {
         return;
