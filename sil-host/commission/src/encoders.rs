@@ -5,9 +5,8 @@
 //! third, only the elbow, by −90°. This identifies the encoders and their directions.
 
 use painleve_firmware::estimate::encoder_correction::EncoderCorrection;
-use painleve_shared::JointTorque;
 use painleve_shared::counts::{EncoderCounts, EncoderScale, ForceCounts};
-use painleve_shared::{JointMotion, Pose};
+use painleve_shared::{JointMotion, JointTorque, Pose};
 
 use crate::identification::terms;
 use crate::readings::{MeanReadings, Session, forward};

@@ -45,9 +45,7 @@ impl Paced {
     pub fn finish(self) -> (Histogram<u64>, u64, PlantEnd) {
         (self.lateness_ns, self.missed_deadlines, self.end)
     }
-}
 
-impl Paced {
     /// Spends a tick: sends its frame, unless it is lost, and waits for the answer and for the clock.
     fn spend(&mut self, frame: Option<&SensorFrame>) -> Result<Answer, HostError> {
         let start = Instant::now();

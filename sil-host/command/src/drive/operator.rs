@@ -35,6 +35,20 @@ impl OperatorCommand {
             other => Self::Unknown(other.to_owned()),
         }
     }
+
+    /// Returns whether this confirms a task of a procedure, and tells the operator what the procedure does not understand.
+    fn confirms(self) -> Result<bool, Ended> {
+        let unknown = match self {
+            Self::Confirm => return Ok(true),
+            Self::Stop | Self::Disarm | Self::End => return Err(Ended),
+            Self::Arm => "arm".to_owned(),
+            Self::Unknown(text) => text,
+        };
+        warn(format_args!(
+            "unknown command {unknown:?}: the return key or stop"
+        ));
+        Ok(false)
+    }
 }
 
 /// The operator has ended a procedure.
@@ -69,15 +83,7 @@ impl Operator {
     /// # Errors
     /// [`Ended`] if the operator ends the procedure, or can no longer confirm anything.
     pub fn confirms(&self) -> Result<bool, Ended> {
-        match self.order() {
-            None => Ok(false),
-            Some(OperatorCommand::Confirm) => Ok(true),
-            Some(OperatorCommand::Stop | OperatorCommand::Disarm | OperatorCommand::End) => {
-                Err(Ended)
-            }
-            Some(OperatorCommand::Arm) => Ok(not_understood("arm")),
-            Some(OperatorCommand::Unknown(text)) => Ok(not_understood(&text)),
-        }
+        self.order().map_or(Ok(false), OperatorCommand::confirms)
     }
 
     /// Takes what the operator has said while no task waits: only an end counts. The end of standard input is none.
@@ -85,28 +91,11 @@ impl Operator {
     /// # Errors
     /// [`Ended`] if the operator ends the procedure.
     pub fn attend(&self) -> Result<(), Ended> {
-        loop {
-            match self.order() {
-                None | Some(OperatorCommand::End) => return Ok(()),
-                Some(OperatorCommand::Stop | OperatorCommand::Disarm) => return Err(Ended),
-                Some(OperatorCommand::Confirm) => {}
-                Some(OperatorCommand::Arm) => {
-                    not_understood("arm");
-                }
-                Some(OperatorCommand::Unknown(text)) => {
-                    not_understood(&text);
-                }
-            }
+        while let Some(order) = self.order().filter(|it| *it != OperatorCommand::End) {
+            order.confirms()?;
         }
+        Ok(())
     }
-}
-
-/// Tells what a procedure understands; returns that nothing is confirmed.
-fn not_understood(text: &str) -> bool {
-    warn(format_args!(
-        "unknown command {text:?}: the return key or stop"
-    ));
-    false
 }
 
 /// Passes on the lines of an input until it ends. A line may be in any character set.
