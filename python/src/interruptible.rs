@@ -69,7 +69,7 @@ impl Plant for Interruptible {
         self.plant.command_torque(target_nm, lag_s);
     }
 
-    fn advance(&mut self, until_s: f64, probe: &mut impl Probe) -> Result<(), PlantError> {
+    fn advance(&mut self, until_s: f64, probe: &mut dyn Probe) -> Result<(), PlantError> {
         if self.interrupted {
             return Err(PlantError::new(Interrupted::Before));
         }
@@ -124,7 +124,7 @@ impl Watch {
 }
 
 impl Probe for Watch {
-    fn step(&mut self, _: &impl Step) {
+    fn step(&mut self, _: &dyn Step) {
         self.count();
     }
 

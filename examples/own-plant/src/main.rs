@@ -46,7 +46,7 @@ impl Plant for MassOnBelt {
         self.now.torque_nm = target_nm;
     }
 
-    fn advance(&mut self, until_s: f64, _: &mut impl Probe) -> Result<(), PlantError> {
+    fn advance(&mut self, until_s: f64, _: &mut dyn Probe) -> Result<(), PlantError> {
         let stretched = || PlantError::new(io::Error::other("the arm is stretched"));
         let (arm, now) = (&self.arm, &mut self.now);
         while now.time_s < until_s {

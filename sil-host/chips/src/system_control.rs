@@ -19,6 +19,17 @@ const SYSTICK: Exception = 15;
 /// Implemented bits of a priority, from the top of its byte.
 const PRIORITY_MASK: u8 = 0xf0;
 
+/// The processor's registers that mask exceptions.
+#[derive(Clone, Copy)]
+pub struct Masks {
+    /// Masks all but hard faults and the non-maskable interrupt.
+    pub primask: bool,
+    /// Masks exceptions of this priority and less urgent ones, unless 0.
+    pub basepri: u8,
+    /// Masks all but the non-maskable interrupt.
+    pub faultmask: bool,
+}
+
 /// Registers of the core peripherals.
 #[derive(Clone)]
 pub struct SystemControl {
@@ -123,31 +134,36 @@ impl SystemControl {
         self.protection.permits(address, self.present_priority())
     }
 
-    /// Returns the next exception, if masks and present priority allow it.
-    pub fn next(&self, primask: bool, basepri: u8, faultmask: bool) -> Option<Exception> {
-        if self.nmi_pending && self.present_priority() > -2 {
+    /// Returns the next exception, if masks and present priority allow it. The masks are asked for
+    /// only if the present priority does.
+    pub fn next(&self, masks: impl FnOnce() -> Masks) -> Option<Exception> {
+        let present = self.present_priority();
+        if self.nmi_pending && present > self.priority(NMI) {
             return Some(NMI);
         }
-        let pending = self.pending();
-        let systick = self.systick_pending;
-        if (pending == 0 && !systick) || primask || faultmask {
-            return None;
-        }
-        let mut best = systick.then(|| (SYSTICK, self.priority(SYSTICK)));
-        for interrupt in 0..INTERRUPTS {
-            if pending & 1 << interrupt != 0 {
-                let priority = self.priority(interrupt + 16);
-                if best.is_none_or(|(_, least)| priority < least) {
-                    best = Some((interrupt + 16, priority));
-                }
+        let mut pending = self.pending();
+        let mut best = self
+            .systick_pending
+            .then(|| (SYSTICK, self.priority(SYSTICK)));
+        while pending != 0 {
+            let exception = pending.trailing_zeros() as usize + 16;
+            let priority = self.priority(exception);
+            if best.is_none_or(|(_, least)| priority < least) {
+                best = Some((exception, priority));
             }
+            pending &= pending - 1;
         }
-        let (exception, priority) = best?;
-        let mask = match basepri & PRIORITY_MASK {
+        let (exception, priority) = best.filter(|(_, priority)| *priority < present)?;
+        let Masks {
+            primask,
+            basepri,
+            faultmask,
+        } = masks();
+        let limit = match basepri & PRIORITY_MASK {
             0 => 256,
-            mask => mask.into(),
+            limit => limit.into(),
         };
-        (priority < self.present_priority().min(mask)).then_some(exception)
+        (!primask && !faultmask && priority < limit).then_some(exception)
     }
 
     /// Enters an exception.

@@ -19,6 +19,8 @@ use std::path::Path;
 
 use libloading::Library;
 
+use crate::system_control::Masks;
+
 type Handle = *mut c_void;
 type Status = i32;
 
@@ -176,6 +178,15 @@ impl Processor {
         let status = unsafe { (self.functions.register_read)(self.handle, register.0, place) };
         assert_eq!(status, 0, "{register:?}");
         value
+    }
+
+    /// Returns the registers that mask exceptions.
+    pub fn masks(&self) -> Masks {
+        Masks {
+            primask: self.get(Register::PRIMASK) & 1 != 0,
+            basepri: self.get(Register::BASEPRI) as u8,
+            faultmask: self.get(Register::FAULTMASK) & 1 != 0,
+        }
     }
 
     /// Copies memory; returns `false` for unmapped addresses.

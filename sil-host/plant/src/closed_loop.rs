@@ -91,7 +91,7 @@ struct Watched<'a, M> {
 
 impl<M: Monitor> Probe for Watched<'_, M> {
     #[inline]
-    fn step(&mut self, step: &impl Step) {
+    fn step(&mut self, step: &dyn Step) {
         self.statistics.step(step);
     }
 

@@ -42,7 +42,7 @@ impl ContactProbe {
 }
 
 impl Probe for ContactProbe {
-    fn step(&mut self, step: &impl Step) {
+    fn step(&mut self, step: &dyn Step) {
         if step.end_s() <= self.from_s {
             return;
         }

@@ -139,7 +139,7 @@ impl<P: Plant> Simulation<P> {
     ///
     /// # Errors
     /// [`PlantError`] if the contact mode of the start cannot be decided.
-    pub fn sample(&mut self, probe: &mut impl Probe) -> Result<SensorFrame, PlantError> {
+    pub fn sample(&mut self, probe: &mut dyn Probe) -> Result<SensorFrame, PlantError> {
         self.plant.advance(self.plant.time_s(), probe)?;
         self.lost = self.link.draw();
         let time_s = self.plant.time_s();
@@ -192,7 +192,7 @@ impl<P: Plant> Simulation<P> {
     pub fn advance(
         &mut self,
         answer: Option<&ActuatorFrame>,
-        probe: &mut impl Probe,
+        probe: &mut dyn Probe,
     ) -> Result<(), PlantError> {
         let arrived = answer.filter(|_| !self.lost.actuator);
         let torques = arrived.map(|frame| frame.torques);

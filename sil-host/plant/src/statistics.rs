@@ -88,7 +88,7 @@ fn smaller(least_n: f64, force_n: f64) -> f64 {
 
 impl Probe for Statistics {
     #[inline]
-    fn step(&mut self, step: &impl Step) {
+    fn step(&mut self, step: &dyn Step) {
         let duration = step.end_s() - step.start_s();
         self.total_s += duration;
         if step.mode().is_contact() {

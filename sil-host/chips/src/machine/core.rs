@@ -8,7 +8,7 @@ use super::trace::Trace;
 use crate::Picoseconds;
 use crate::registers::Registers;
 use crate::system_control::{Exception, SystemControl};
-use crate::unicorn::{Processor, Register, Surroundings};
+use crate::unicorn::{Processor, Surroundings};
 
 /// Addresses of the SysTick timer.
 const SYSTICK: std::ops::Range<u32> = 0xe000_e010..0xe000_e020;
@@ -87,11 +87,7 @@ impl<C: Chip> Core<C> {
     }
 
     fn exception(&self, processor: &Processor) -> Option<Exception> {
-        self.system.next(
-            processor.get(Register::PRIMASK) & 1 != 0,
-            processor.get(Register::BASEPRI) as u8,
-            processor.get(Register::FAULTMASK) & 1 != 0,
-        )
+        self.system.next(|| processor.masks())
     }
 
     fn opcode(&self, address: u32) -> u16 {

@@ -18,9 +18,8 @@ impl<C: Chip> Machine<C> {
         let core = self.unicorn.surroundings();
         let mut system = core.system.clone();
         system.pend(interrupt);
-        let primask = self.unicorn.get(Register::PRIMASK) & 1 != 0;
-        let basepri = self.unicorn.get(Register::BASEPRI) as u8;
-        core.conditional == 0 && system.next(primask, basepri, false) == Some(interrupt + 16)
+        let next = system.next(|| self.unicorn.processor().masks());
+        core.conditional == 0 && next == Some(interrupt + 16)
     }
 
     /// Lets every instruction take this many cycles, as with a flash that is too slow.

@@ -60,7 +60,7 @@ pub struct SimulatedSlides<P = BuiltInPlant> {
 struct LargestForce(f64);
 
 impl Probe for LargestForce {
-    fn step(&mut self, step: &impl Step) {
+    fn step(&mut self, step: &dyn Step) {
         let Self(largest_n) = self;
         *largest_n = largest_n.max(step.end().normal_force_n);
     }

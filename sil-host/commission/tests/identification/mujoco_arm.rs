@@ -184,7 +184,7 @@ impl Plant for MujocoArm {
         self.now.torque_nm = target_nm;
     }
 
-    fn advance(&mut self, until_s: f64, probe: &mut impl Probe) -> Result<(), PlantError> {
+    fn advance(&mut self, until_s: f64, probe: &mut dyn Probe) -> Result<(), PlantError> {
         let duration_s = until_s - self.now.time_s;
         if duration_s <= 0.0 {
             return Ok(());

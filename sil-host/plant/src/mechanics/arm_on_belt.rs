@@ -181,7 +181,7 @@ impl ArmOnBelt {
     /// # Errors
     /// [`MotionError`] if no mode is possible.
     #[inline]
-    pub fn settle(&mut self, probe: &mut impl ArmProbe) -> Result<(), MotionError> {
+    pub fn settle(&mut self, probe: &mut dyn ArmProbe) -> Result<(), MotionError> {
         if self.unsettled
             && self.mode.is_contact()
             && !transition::slides_on(self.mode, self.evaluate())
@@ -217,7 +217,7 @@ impl ArmOnBelt {
     ///
     /// # Errors
     /// [`MotionError`]; the plant stays at the time of the error.
-    pub fn advance(&mut self, until_s: f64, probe: &mut impl ArmProbe) -> Result<(), MotionError> {
+    pub fn advance(&mut self, until_s: f64, probe: &mut dyn ArmProbe) -> Result<(), MotionError> {
         while self.time_s < until_s {
             let corner = self.belt.next_corner_s(self.time_s).min(until_s);
             self.settle(probe)?;
@@ -231,7 +231,7 @@ impl ArmOnBelt {
     fn advance_smoothly(
         &mut self,
         until_s: f64,
-        probe: &mut impl ArmProbe,
+        probe: &mut dyn ArmProbe,
     ) -> Result<(), MotionError> {
         let mut events = 0;
         let mut event_s = self.time_s;
@@ -261,7 +261,7 @@ impl ArmOnBelt {
     fn step_or_event(
         &mut self,
         until_s: f64,
-        probe: &mut impl ArmProbe,
+        probe: &mut dyn ArmProbe,
     ) -> Result<Option<f64>, MotionError> {
         let here = *self.evaluate();
         let motion = Motion {
@@ -415,8 +415,8 @@ impl Plant for ArmOnBelt {
         Self::command_torque(self, target_nm, lag_s);
     }
 
-    fn advance(&mut self, until_s: f64, probe: &mut impl Probe) -> Result<(), PlantError> {
-        Self::advance(self, until_s, probe).map_err(PlantError::new)
+    fn advance(&mut self, until_s: f64, mut probe: &mut dyn Probe) -> Result<(), PlantError> {
+        Self::advance(self, until_s, &mut probe).map_err(PlantError::new)
     }
 
     fn time_s(&self) -> f64 {

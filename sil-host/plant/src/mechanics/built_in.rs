@@ -43,7 +43,7 @@ impl Plant for BuiltInPlant {
         }
     }
 
-    fn advance(&mut self, until_s: f64, probe: &mut impl Probe) -> Result<(), PlantError> {
+    fn advance(&mut self, until_s: f64, probe: &mut dyn Probe) -> Result<(), PlantError> {
         match self {
             Self::Rigid(plant) => Plant::advance(plant, until_s, probe),
             Self::Compliant(plant) => Plant::advance(plant, until_s, probe),

@@ -33,7 +33,7 @@ pub type State = Vector4<f64>;
 ///         self.0.torque_nm = target_nm;
 ///     }
 ///
-///     fn advance(&mut self, until_s: f64, _: &mut impl Probe) -> Result<(), PlantError> {
+///     fn advance(&mut self, until_s: f64, _: &mut dyn Probe) -> Result<(), PlantError> {
 ///         const INERTIA_KG_M2: f64 = 0.01;
 ///         let step_s = until_s - self.0.time_s;
 ///         let torque_nm = self.0.torque_nm.to_links();
@@ -67,7 +67,7 @@ pub trait Plant {
     ///
     /// # Errors
     /// [`PlantError`] if the motion cannot be continued.
-    fn advance(&mut self, until_s: f64, probe: &mut impl Probe) -> Result<(), PlantError>;
+    fn advance(&mut self, until_s: f64, probe: &mut dyn Probe) -> Result<(), PlantError>;
 
     /// Returns the present time, s.
     fn time_s(&self) -> f64 {

@@ -43,20 +43,31 @@ pub trait Step {
 /// Observes the motion of a plant at the plant's own resolution.
 pub trait Probe {
     /// Called after every step.
-    fn step(&mut self, step: &impl Step);
+    fn step(&mut self, step: &dyn Step);
     /// Called at every discontinuity; `state` is the state after it.
     fn event(&mut self, time_s: f64, event: Event, state: &State);
 }
 
 /// Ignores everything.
 impl Probe for () {
-    fn step(&mut self, _: &impl Step) {}
+    fn step(&mut self, _: &dyn Step) {}
     fn event(&mut self, _: f64, _: Event, _: &State) {}
 }
 
+/// The probe behind a reference.
+impl<P: Probe + ?Sized> Probe for &mut P {
+    fn step(&mut self, step: &dyn Step) {
+        (**self).step(step);
+    }
+
+    fn event(&mut self, time_s: f64, event: Event, state: &State) {
+        (**self).event(time_s, event, state);
+    }
+}
+
 /// Two probes, called in order.
-impl<A: Probe, B: Probe> Probe for (&mut A, &mut B) {
-    fn step(&mut self, step: &impl Step) {
+impl<A: Probe + ?Sized, B: Probe + ?Sized> Probe for (&mut A, &mut B) {
+    fn step(&mut self, step: &dyn Step) {
         self.0.step(step);
         self.1.step(step);
     }

@@ -25,7 +25,7 @@ impl InCone {
 }
 
 impl Probe for InCone {
-    fn step(&mut self, step: &impl Step) {
+    fn step(&mut self, step: &dyn Step) {
         self.steps += 1;
         self.check(&step.start());
         self.check(&step.end());

@@ -49,7 +49,7 @@ impl<P: Plant> Trial<P> {
     ///
     /// # Errors
     /// [`PlantError`] if the plant cannot continue.
-    pub fn tick(&mut self, probe: &mut impl Probe) -> Result<(), PlantError> {
+    pub fn tick(&mut self, probe: &mut dyn Probe) -> Result<(), PlantError> {
         let sensor = self.simulation.sample(probe)?;
         let arrives = !self.simulation.sensor_frame_is_lost();
         if arrives {

@@ -85,7 +85,7 @@ pub fn advance_or_settle(plant: &mut ArmOnBelt, duration_s: f64) -> Result<bool,
 }
 
 impl Probe for Attractor {
-    fn step(&mut self, step: &impl Step) {
+    fn step(&mut self, step: &dyn Step) {
         let (start, end) = (step.start(), step.end());
         let duration_s = end.time_s - start.time_s;
         let rate = |at: &Snapshot| [at.theta_dot_rad_s.first(), at.theta_ddot_rad_s2.first()];

@@ -38,7 +38,7 @@
 //!         self.0.command_torque(target_nm * 0.98, lag_s);
 //!     }
 //!
-//!     fn advance(&mut self, until_s: f64, probe: &mut impl Probe) -> Result<(), PlantError> {
+//!     fn advance(&mut self, until_s: f64, probe: &mut dyn Probe) -> Result<(), PlantError> {
 //!         self.0.advance(until_s, probe)
 //!     }
 //! }

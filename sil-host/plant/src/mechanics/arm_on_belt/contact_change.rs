@@ -8,7 +8,7 @@ use crate::plant::{ContactMode, Event};
 
 impl ArmOnBelt {
     /// Handles a landing, or the end of sliding or sticking.
-    pub(super) fn handle_event(&mut self, probe: &mut impl ArmProbe) -> Result<(), MotionError> {
+    pub(super) fn handle_event(&mut self, probe: &mut dyn ArmProbe) -> Result<(), MotionError> {
         if self.mode.is_contact() {
             let motion = self.motion();
             let slip = motion.relative_velocity_m_s(self.time_s, &self.state).x;
@@ -45,7 +45,7 @@ impl ArmOnBelt {
     }
 
     /// Decides what follows for a tip on the belt without normal velocity.
-    pub(super) fn enter_contact(&mut self, probe: &mut impl ArmProbe) -> Result<(), MotionError> {
+    pub(super) fn enter_contact(&mut self, probe: &mut dyn ArmProbe) -> Result<(), MotionError> {
         // Each throw that does not lift the tip ends its slip, so only sticking and sliding from
         // rest remain.
         self.evaluation = None;
@@ -96,7 +96,7 @@ impl ArmOnBelt {
         Ok(impulse_ns.into())
     }
 
-    fn change_mode(&mut self, mode: ContactMode, probe: &mut impl ArmProbe) {
+    fn change_mode(&mut self, mode: ContactMode, probe: &mut dyn ArmProbe) {
         if mode != self.mode {
             let from = core::mem::replace(&mut self.mode, mode);
             probe.event(

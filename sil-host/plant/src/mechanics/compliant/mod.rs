@@ -142,7 +142,7 @@ impl CompliantArmOnBelt {
     ///
     /// # Errors
     /// [`MotionError`]; the plant stays at the time of the error.
-    pub fn advance(&mut self, until_s: f64, probe: &mut impl Probe) -> Result<(), MotionError> {
+    pub fn advance(&mut self, until_s: f64, probe: &mut dyn Probe) -> Result<(), MotionError> {
         while self.time_s < until_s {
             let payload = &self.effects.payload;
             if self.time_s >= payload.at_s
@@ -183,7 +183,7 @@ impl CompliantArmOnBelt {
     fn advance_smoothly<const N: usize>(
         &mut self,
         until_s: f64,
-        probe: &mut impl Probe,
+        probe: &mut dyn Probe,
     ) -> Result<(), MotionError>
     where
         Const<N>: DimMin<Const<N>, Output = Const<N>> + ToTypenum,
@@ -265,7 +265,7 @@ impl Plant for CompliantArmOnBelt {
         self.torque = self.torque.followed_by(self.time_s, target_nm, lag_s);
     }
 
-    fn advance(&mut self, until_s: f64, probe: &mut impl Probe) -> Result<(), PlantError> {
+    fn advance(&mut self, until_s: f64, probe: &mut dyn Probe) -> Result<(), PlantError> {
         Self::advance(self, until_s, probe).map_err(PlantError::new)
     }
 

@@ -41,7 +41,7 @@ impl FirstFlight {
 }
 
 impl Probe for FirstFlight {
-    fn step(&mut self, step: &impl Step) {
+    fn step(&mut self, step: &dyn Step) {
         if step.start_s() < self.from_s {
             return;
         }

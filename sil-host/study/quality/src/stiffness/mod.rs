@@ -214,7 +214,7 @@ struct Flights {
 }
 
 impl Probe for Flights {
-    fn step(&mut self, step: &impl Step) {
+    fn step(&mut self, step: &dyn Step) {
         if step.mode().is_contact() {
             self.since_s = None;
         } else {

@@ -41,7 +41,7 @@ pub struct Trace {
 }
 
 impl Probe for FirstContact {
-    fn step(&mut self, step: &impl Step) {
+    fn step(&mut self, step: &dyn Step) {
         if self.ended {
             return;
         }
