@@ -82,6 +82,17 @@ impl BeltEstimator {
         tip_velocity_m_s > self.slowest_m_s - BOUND_ERROR_M_S
             && tip_velocity_m_s < self.fastest_m_s + BOUND_ERROR_M_S
     }
+
+    /// Returns the direction of slip of a tip at rest, if the bounds leave one.
+    pub fn slip_at_rest(&self) -> Option<Slip> {
+        if self.fastest_m_s < -BOUND_ERROR_M_S {
+            Some(Slip::Positive)
+        } else if self.slowest_m_s > BOUND_ERROR_M_S {
+            Some(Slip::Negative)
+        } else {
+            None
+        }
+    }
 }
 
 #[cfg(test)]
@@ -132,6 +143,31 @@ mod tests {
         }
         let (slowest, fastest) = belt.bounds_m_s();
         assert!((slowest + 0.45).abs() < 1e-3 && (fastest + 0.05).abs() < 1e-3);
+    }
+
+    #[test]
+    fn the_slip_of_a_tip_at_rest_is_against_the_belt() {
+        let mut belt = BeltEstimator::new(&BeltSpeedSettings::default(), 1e-3);
+        assert_eq!(belt.slip_at_rest(), None);
+        // Slip in one direction bounds the belt's speed on one side.
+        belt.update(0.3, Some(&friction(Slip::Positive, false)));
+        assert_eq!(belt.slip_at_rest(), None);
+        belt.update(-0.15, Some(&friction(Slip::Positive, false)));
+        assert_eq!(belt.slip_at_rest(), Some(Slip::Positive));
+        // A tip that is thrown faster than the belt does not change that.
+        belt.update(-0.2, Some(&friction(Slip::Negative, false)));
+        assert_eq!(belt.slip_at_rest(), Some(Slip::Positive));
+        // In time the belt may have turned.
+        for _ in 0..100 {
+            belt.update(0.0, None);
+        }
+        assert_eq!(belt.slip_at_rest(), None);
+        let forwards = BeltSpeedSettings {
+            given_m_s: Some(0.2),
+            ..Default::default()
+        };
+        let slip = BeltEstimator::new(&forwards, 1e-3).slip_at_rest();
+        assert_eq!(slip, Some(Slip::Negative));
     }
 
     #[test]

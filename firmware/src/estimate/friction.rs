@@ -254,9 +254,11 @@ impl FrictionEstimator {
         }
     }
 
-    /// Forgets how well μ is known. A tip that has left the belt may have been thrown off by more friction than estimated.
-    pub fn doubt(&mut self) {
+    /// Forgets how well μ is known: a tip that has left the belt may have been thrown off by more friction than
+    /// estimated. It will land at rest, with the slip `at_rest` if that is known.
+    pub fn leave(&mut self, at_rest: Option<Slip>) {
         self.estimate.variance = self.first_variance;
+        self.estimate.slip = at_rest.unwrap_or(self.estimate.slip);
     }
 
     /// Returns the present estimate.

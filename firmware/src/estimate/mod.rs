@@ -216,7 +216,7 @@ impl Estimators {
     #[inline]
     pub fn learn_in_the_air(&mut self, observed: &Observed, turn: Turn) {
         if self.contact.leaves {
-            self.friction.doubt();
+            self.friction.leave(self.belt.slip_at_rest());
         }
         let tip_velocity_m_s = self.model.tip_velocity_m_s.x;
         self.belt.update(tip_velocity_m_s, None);

