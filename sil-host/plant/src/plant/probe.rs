@@ -66,7 +66,7 @@ impl<P: Probe + ?Sized> Probe for &mut P {
 }
 
 /// Two probes, called in order.
-impl<A: Probe + ?Sized, B: Probe + ?Sized> Probe for (&mut A, &mut B) {
+impl<A: Probe, B: Probe> Probe for (A, B) {
     fn step(&mut self, step: &dyn Step) {
         self.0.step(step);
         self.1.step(step);
