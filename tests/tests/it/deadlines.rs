@@ -22,14 +22,19 @@ const NO_TORQUE: [TorqueCounts; 2] = [TorqueCounts(0); 2];
 /// A control rate that even a busy machine achieves.
 const SLOW: [&str; 2] = ["run.tick_hz=50", "controller.estimator.bandwidth_rad_s=100"];
 
-#[test]
-fn a_delayed_controller_ends_the_run_with_a_fault_and_its_exit_code() {
-    let bench = Bench::new("held-up");
+/// A run of two seconds in real time, with a report.
+fn two_slow_seconds(bench: &Bench) -> Vec<&str> {
     let mut arguments = vec!["run", "--pacing", "realtime", "--bus", &bench.bus];
     arguments.extend(["--json", "--no-record", "--no-plot"]);
     arguments.extend(["--set", "run.duration_s=2"]);
     arguments.extend(SLOW.iter().flat_map(|key| ["--set", key]));
-    let run = bench.start(&arguments);
+    arguments
+}
+
+#[test]
+fn a_delayed_controller_ends_the_run_with_a_fault_and_its_exit_code() {
+    let bench = Bench::new("held-up");
+    let run = bench.start(&two_slow_seconds(&bench));
     let controller = child_of(run.id(), "controller");
     std::thread::sleep(Duration::from_millis(800));
     // About twenty ticks of the plant.
@@ -49,11 +54,8 @@ fn a_delayed_controller_ends_the_run_with_a_fault_and_its_exit_code() {
 #[test]
 fn a_tick_whose_frame_is_lost_takes_its_time() {
     let bench = Bench::new("lost");
-    let mut arguments = vec!["run", "--pacing", "realtime", "--bus", &bench.bus];
-    arguments.extend(["--json", "--no-record", "--no-plot"]);
-    arguments.extend(["--set", "run.duration_s=2"]);
+    let mut arguments = two_slow_seconds(&bench);
     arguments.extend(["--set", "converters.link.frame_loss=0.5"]);
-    arguments.extend(SLOW.iter().flat_map(|key| ["--set", key]));
     let output = bench.run(&arguments);
     let report: Value = serde_json::from_slice(&output.stdout).expect("a whole report");
     let factor = report["realtime_factor"].as_f64().unwrap();
