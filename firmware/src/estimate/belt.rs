@@ -85,13 +85,7 @@ impl BeltEstimator {
 
     /// Returns the direction of slip of a tip at rest, if the bounds leave one.
     pub fn slip_at_rest(&self) -> Option<Slip> {
-        if self.fastest_m_s < -BOUND_ERROR_M_S {
-            Some(Slip::Positive)
-        } else if self.slowest_m_s > BOUND_ERROR_M_S {
-            Some(Slip::Negative)
-        } else {
-            None
-        }
+        (!self.may_stick(0.0)).then(|| Slip::of(-self.fastest_m_s))
     }
 }
 
