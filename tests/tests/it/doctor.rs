@@ -218,6 +218,6 @@ fn the_doctor_and_a_run_say_the_same_about_real_time() {
     // What was granted is no warning.
     if scheduling == "real time: SCHED_FIFO priority 49, memory locked" {
         let output = ward.bench.run(&[&run[..], &short, &["--quiet"]].concat());
-        assert_eq!(errors(&output), "");
+        assert!(!errors(&output).contains("SCHED_FIFO"), "{output:?}");
     }
 }
