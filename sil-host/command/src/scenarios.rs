@@ -36,7 +36,7 @@ pub fn run(arguments: &ScenariosArguments) -> Result<(), CommandError> {
     if let Some(name) = &arguments.scenario {
         let scenario = Scenario::load(name, &arguments.overrides)?;
         if arguments.json {
-            return say(serde_json::to_string(&scenario).map_err(output)?);
+            return say(scenario.to_json().map_err(output)?);
         }
         let text = if arguments.diff {
             scenario.to_brief_toml()

@@ -89,7 +89,7 @@ pub enum KeyError {
     #[error("{}", in_words(&source.to_string(), setting.as_ref()))]
     Value {
         /// What the deserializer says.
-        source: erased_serde::Error,
+        source: Box<toml::de::Error>,
         /// The setting with its range, if there is one with this key.
         setting: Option<Field>,
     },

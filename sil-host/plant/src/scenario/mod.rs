@@ -17,6 +17,9 @@ mod words;
 
 use painleve_firmware::configuration::ControllerSettings;
 use painleve_shared::{ArmParameters, OutOfRange, settings};
+use serde::Deserialize;
+use serde_path_to_error::{Deserializer, Path, Track};
+use toml::{Table, Value};
 
 use crate::Configuration;
 use crate::converters::ConverterSettings;
@@ -137,6 +140,14 @@ impl Scenario {
             .rev()
             .find_map(|segment| segment.target_m())
             .map(as_written)
+    }
+
+    /// Reads a scenario from a table; an error has the path of its key. All scenarios are read here, because each type of
+    /// setting is compiled once for each type of deserializer.
+    fn from_keys(table: Table) -> Result<Self, (Path, Box<toml::de::Error>)> {
+        let mut track = Track::new();
+        let keys = Deserializer::new(Value::Table(table), &mut track);
+        Self::deserialize(keys).map_err(|error| (track.path(), Box::new(error)))
     }
 
     /// Checks the limits that depend on several parts.

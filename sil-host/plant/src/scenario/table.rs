@@ -1,7 +1,6 @@
 //! Scenarios from TOML tables.
 
-use serde_path_to_error::{Deserializer, Track};
-use toml::{Table, Value};
+use toml::Table;
 
 use super::error::{KeyError, ScenarioError};
 use super::words::TomlError;
@@ -25,13 +24,8 @@ pub(super) fn from_table(
         key: "controller.reference".into(),
         source: KeyError::File(reason),
     })?;
-    let mut track = Track::new();
-    // Erased, because every type of a scenario is compiled once for each type of deserializer.
-    let source = Deserializer::new(Value::Table(table), &mut track);
-    let scenario: Result<Scenario, _> =
-        erased_serde::deserialize(&mut <dyn erased_serde::Deserializer<'_>>::erase(source));
-    let scenario = scenario.map_err(|source| {
-        let key = track.path().to_string();
+    let scenario = Scenario::from_keys(table).map_err(|(path, source)| {
+        let key = path.to_string();
         let parts: Vec<&str> = key
             .split(['.', '[', ']'])
             .filter(|it| !it.is_empty())

@@ -15,6 +15,7 @@ use std::f64::consts::PI;
 
 use painleve_shared::settings::{Field, Range, Settings, Shape, Variant};
 use serde::Serialize;
+use serde::ser::Error;
 use toml::{Table, Value};
 
 use super::Scenario;
@@ -32,12 +33,13 @@ impl Scenario {
         toml::to_string(self)
     }
 
-    /// Returns every key of the scenario as JSON.
+    /// Returns every key of the scenario that is not absent as JSON.
     ///
     /// # Errors
-    /// None: it would be a mistake in the declaration of a setting.
+    /// As [`Self::to_toml`].
     pub fn to_json(&self) -> serde_json::Result<serde_json::Value> {
-        serde_json::to_value(self)
+        let text = self.to_toml().map_err(serde_json::Error::custom)?;
+        serde_json::to_value(text.parse::<Table>().unwrap_or_default())
     }
 }
 
@@ -245,8 +247,7 @@ fn default_at(path: &[&str]) -> Option<Value> {
     let chosen = path.iter().rev().skip(1).fold(Table::new(), |inner, key| {
         Table::from_iter([((*key).to_string(), Value::Table(inner))])
     });
-    let chosen = &mut <dyn erased_serde::Deserializer<'_>>::erase(Value::Table(chosen));
-    let scenario: Scenario = erased_serde::deserialize(chosen).unwrap_or_default();
+    let scenario = Scenario::from_keys(chosen).unwrap_or_default();
     path.iter()
         .try_fold(Value::Table(table(&scenario)), |value, key| {
             value.get(key).cloned()
