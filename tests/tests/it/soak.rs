@@ -314,6 +314,7 @@ fn every_counter_is_exact_after_a_long_run_with_a_fault_every_minute() {
 }
 
 #[test]
+#[ignore = "soak"]
 fn every_counter_is_exact_after_a_long_run_of_the_image() {
     soak(minutes("PAINLEVE_SOAK_QEMU_MINUTES", 1), |scenario| {
         let configuration = scenario.controller_configuration();

