@@ -23,8 +23,8 @@ pub struct Fineness {
     pub open_loop_s: [f64; 2],
     /// Transient and recording time with control, s.
     pub closed_loop_s: [f64; 2],
-    /// Spacing of the targets tried first, m.
-    pub scan_step_m: f64,
+    /// Spacing of the targets tried first, and accuracy of the sliding range, m.
+    pub sliding_range_m: [f64; 2],
 }
 
 impl Fineness {
@@ -38,7 +38,7 @@ impl Fineness {
         ideal_v_belt: "-1:-0.1:0.025",
         open_loop_s: [250.0, 50.0],
         closed_loop_s: [20.0, 10.0],
-        scan_step_m: 5e-3,
+        sliding_range_m: [5e-3, 1e-4],
     };
 
     /// Coarse grids and short runs, for a preview.
@@ -51,7 +51,7 @@ impl Fineness {
         ideal_v_belt: "-0.4",
         open_loop_s: [60.0, 10.0],
         closed_loop_s: [5.0, 1.0],
-        scan_step_m: 5e-2,
+        sliding_range_m: [5e-2, 5e-3],
     };
 }
 

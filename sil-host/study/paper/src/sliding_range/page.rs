@@ -16,6 +16,7 @@ use crate::printed::SAMPLED_FRICTION;
 /// # Errors
 /// [`StudyError`] if the study cannot be computed.
 pub fn sections(page: &PageMaker<'_>) -> Result<Vec<PageSection>, StudyError> {
+    let [scan_step_m, resolution_m] = page.fineness.sliding_range_m;
     let study = SlidingRange {
         controllers: ControllerChoice::ALL.to_vec(),
         converters: vec![ConverterChoice::Ideal, ConverterChoice::Hardware],
@@ -24,7 +25,8 @@ pub fn sections(page: &PageMaker<'_>) -> Result<Vec<PageSection>, StudyError> {
         references: vec![Reference::MinimumJerk(3.0)],
         overrides: Vec::new(),
         criterion: Criterion {
-            scan_step_m: page.fineness.scan_step_m,
+            scan_step_m,
+            resolution_m,
             ..Criterion::default()
         },
     };
@@ -38,14 +40,16 @@ pub fn sections(page: &PageMaker<'_>) -> Result<Vec<PageSection>, StudyError> {
     let mut rows = page.rows("Sliding range", &study)?;
     rows.extend(page.rows("Sliding range, ramps", &ramps)?);
     let outcome = SlidingRanges { rows };
-    let step = page.fineness.scan_step_m;
-    let commands = vec![
-        format!("painleve study sliding-range --scan-step-m {step}"),
+    let commands = [
+        "",
+        " --controller pid,hybrid --converters ideal --posture elbow-down --reference ramp:2,ramp:3",
+    ]
+    .map(|cases| {
         format!(
-            "painleve study sliding-range --controller pid,hybrid --converters ideal \
-             --posture elbow-down --reference ramp:2,ramp:3 --scan-step-m {step}"
-        ),
-    ];
+            "painleve study sliding-range{cases} --scan-step-m {scan_step_m} --resolution-m {resolution_m}"
+        )
+    });
+    let commands = commands.to_vec();
     Ok(vec![(ranges(&outcome, commands), Box::new(outcome))])
 }
 
