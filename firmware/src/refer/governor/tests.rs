@@ -283,3 +283,18 @@ fn a_reference_that_was_reached_is_followed_however_fast() {
         assert_eq!(governor.govern(&wanted), wanted, "{tick}");
     }
 }
+
+#[test]
+fn a_governor_that_is_off_passes_any_reference_on() {
+    let friction = known(0.6, Slip::Positive);
+    let mut governor = with(&configuration(&GovernorSettings {
+        enabled: false,
+        ..Default::default()
+    }));
+    for _ in 0..300 {
+        governor.search(&arm(), Posture::ElbowDown, 0.0, &friction, 0.0);
+    }
+    let beyond = TipReference::at_rest(0.2);
+    assert_eq!(governor.govern(&beyond), beyond);
+    assert!(!governor.is_at_edge());
+}
