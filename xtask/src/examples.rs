@@ -11,7 +11,11 @@ use crate::{boards, build_fw};
 const TARGET: &str = "target/examples";
 
 /// A firmware that is not ours, with the controller in it.
-const OWN_FIRMWARE: &str = "examples/own-firmware/Cargo.toml";
+const OWN_FIRMWARE: [&str; 3] = [
+    "--locked",
+    "--manifest-path",
+    "examples/own-firmware/Cargo.toml",
+];
 
 /// The targets for which it is built, and what of it: `cortex-m-rt`, with which its program starts, is for ARM. The
 /// first is that of the boards.
@@ -22,36 +26,36 @@ pub const CHIPS: [(&str, &str); 4] = [
     ("riscv32imac-unknown-none-elf", "--lib"),
 ];
 
-/// Builds the example of a firmware for the boards' chip, and runs its tests on this machine.
+/// Builds the example of a firmware for the boards' chip.
 ///
 /// # Errors
-/// If it does not build, or fails a test.
+/// If it does not build.
 pub fn own_firmware() -> Result<(), ChoreError> {
     own_firmware_for(&CHIPS[..1])
 }
 
 fn own_firmware_for(chips: &[(&str, &str)]) -> Result<(), ChoreError> {
-    let manifest = ["--locked", "--manifest-path", OWN_FIRMWARE];
     for &(chip, part) in chips {
         build_fw::build(
             chip,
-            &[&[part], &manifest[..]].concat(),
+            &[&[part], &OWN_FIRMWARE[..]].concat(),
             TARGET,
             "debug",
             &[],
         )?;
     }
-    let test = ["test", "--lib", "--target-dir", TARGET];
-    run_cargo(&[&test[..], &manifest[..]].concat())
+    Ok(())
 }
 
-/// Handles the firmware, for all its chips, then every other folder of `examples/` that has a `Cargo.toml`, sorted by name: builds the image
-/// named by `[package.metadata] image`, runs the program, then its tests.
+/// Builds the firmware for all its chips and runs its tests on this machine. Then, for every other folder of `examples/` that
+/// has a `Cargo.toml`, sorted by name: builds the image named by `[package.metadata] image`, runs the program, then its tests.
 ///
 /// # Errors
 /// If an example does not build, ends with an error, or fails a test.
 pub fn run() -> Result<(), ChoreError> {
     own_firmware_for(&CHIPS)?;
+    let test = ["test", "--lib", "--target-dir", TARGET];
+    run_cargo(&[&test[..], &OWN_FIRMWARE].concat())?;
     for manifest in manifests()? {
         let manifest_path = manifest.to_string_lossy();
         let of_example = ["--locked", "--release", "--manifest-path", &manifest_path];
@@ -80,7 +84,7 @@ fn manifests() -> Result<Vec<PathBuf>, ChoreError> {
     let mut manifests = Vec::new();
     for entry in fs::read_dir(&folder).map_err(error)? {
         let manifest = entry.map_err(error)?.path().join("Cargo.toml");
-        if manifest.is_file() && !manifest.ends_with(OWN_FIRMWARE) {
+        if manifest.is_file() && !manifest.ends_with(OWN_FIRMWARE[2]) {
             manifests.push(manifest);
         }
     }
