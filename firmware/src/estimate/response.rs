@@ -23,7 +23,7 @@ settings! {
         enabled: bool = true;
         /// Largest amplitude of the probe, a noise-like force that is added to the desired normal force until the contact
         /// is known to be rigid. It shrinks with the interval in which the response lies.
-        probe_n: f32 = 0.1, 0.0..=10.0, "N";
+        probe_n: f32 = 0.08, 0.0..=10.0, "N";
         /// Least contact damping c that is assumed.
         least_damping_ns_m: f32 = 10.0, 1e-3..=1e9, "N·s/m";
     }
