@@ -153,7 +153,7 @@ fn blocks_follow_each_other_after_the_period_of_their_weight() {
 #[test]
 fn the_better_the_response_is_known_the_less_is_probed() {
     let probe_n = |ticks| observed(ticks, compliant(1e5, 60.0)).probe_n.abs();
-    assert_eq!(probe_n(60), 0.1);
+    assert_eq!(probe_n(60), ResponseSettings::default().probe_n);
     assert!(probe_n(1500) > 0.0 && probe_n(1500) < 0.02);
 }
 
