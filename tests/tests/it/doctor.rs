@@ -215,9 +215,13 @@ fn the_doctor_and_a_run_say_the_same_about_real_time() {
     let short = ["--set", "run.duration_s=0.05"];
     let output = ward.bench.run(&[&run[..], &short].concat());
     assert!(errors(&output).contains(verdict), "{}", errors(&output));
-    // What was granted is no warning.
+    // What was granted is no warning; that a tick came late is the machine's.
     if scheduling == "real time: SCHED_FIFO priority 49, memory locked" {
         let output = ward.bench.run(&[&run[..], &short, &["--quiet"]].concat());
-        assert!(!errors(&output).contains("SCHED_FIFO"), "{output:?}");
+        let messages = errors(&output);
+        let mut others = messages
+            .lines()
+            .filter(|line| !line.starts_with("real time was missed: "));
+        assert_eq!(others.next(), None, "{messages}");
     }
 }
