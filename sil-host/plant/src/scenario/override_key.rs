@@ -3,7 +3,7 @@
 use toml::{Table, Value};
 
 use super::error::{KeyError, MOST_LEVELS, ScenarioError};
-use super::table::{from_table, parse};
+use super::table::from_table;
 use super::{Scenario, describe, initial_key};
 
 /// Returns the scenario with one key changed. The key must exist in the scenario or be optional,
@@ -32,10 +32,8 @@ pub(super) fn with_override(mut scenario: Scenario, text: &str) -> Result<Scenar
         source,
     };
     scenario.initial = initial_key::before_override(scenario.initial, key);
-    let text = scenario
-        .to_toml()
-        .map_err(|error| wrong_key(error.into()))?;
-    let mut root = Value::Table(parse(key, &text)?);
+    let keys = scenario.to_table();
+    let mut root = Value::Table(keys.map_err(|error| wrong_key(error.into()))?);
     // Message on the first part of the key that is missing, unless an optional setting is absent.
     let mut missing = None;
     let parts: Vec<&str> = key.split('.').collect();

@@ -14,7 +14,6 @@ mod schema;
 use std::f64::consts::PI;
 
 use painleve_shared::settings::{Field, Range, Settings, Shape, Variant};
-use serde::Serialize;
 use serde::ser::Error;
 use toml::{Table, Value};
 
@@ -38,16 +37,23 @@ impl Scenario {
     /// # Errors
     /// As [`Self::to_toml`].
     pub fn to_json(&self) -> serde_json::Result<serde_json::Value> {
-        let text = self.to_toml().map_err(serde_json::Error::custom)?;
-        serde_json::to_value(text.parse::<Table>().unwrap_or_default())
+        let table = self.to_table().map_err(serde_json::Error::custom)?;
+        serde_json::to_value(table)
+    }
+
+    /// Returns every key of the scenario as a TOML table; single-precision values keep the digits with which they were
+    /// written.
+    ///
+    /// # Errors
+    /// As [`Self::to_toml`].
+    pub(super) fn to_table(&self) -> Result<Table, toml::ser::Error> {
+        self.to_toml()?.parse().map_err(toml::ser::Error::custom)
     }
 }
 
-/// Returns settings as a TOML table; single-precision values keep the digits with which they were
-/// written.
-fn table<T: Serialize>(settings: &T) -> Table {
-    let text = toml::to_string(settings).unwrap_or_default();
-    text.parse().unwrap_or_default()
+/// Returns a scenario as a TOML table; empty if it cannot be written.
+fn table(scenario: &Scenario) -> Table {
+    scenario.to_table().unwrap_or_default()
 }
 
 /// Returns a setting with the kind of value that this program knows for it.
