@@ -41,8 +41,8 @@ fn rows_do_not_depend_on_threads() {
     assert_eq!(outcome.worst.len(), failed);
 }
 
-/// If 99.45 % of all runs succeed, as in the campaign, fewer than 97 of 100 do with a probability of 0.002 (binomial); if
-/// 95 %, with one of 0.74.
+/// If 99.45 % of all runs succeed, as in the campaign, fewer than 98 of 100 do with a probability of 0.02 (binomial); if
+/// 97 %, with one of 0.58.
 #[test]
 fn the_runs_of_the_regression_seed_succeed() {
     let study = Robustness {
@@ -55,7 +55,7 @@ fn the_runs_of_the_regression_seed_succeed() {
         study.criterion,
         rows(&study, || ()).unwrap(),
     );
-    assert!(outcome.success.successes >= 97, "{}", outcome.table());
+    assert!(outcome.success.successes >= 98, "{}", outcome.table());
 }
 
 #[test]
@@ -140,7 +140,7 @@ fn general_arms_succeed_too() {
         study.criterion,
         rows(&study, || ()).unwrap(),
     );
-    assert!(outcome.success.successes >= 48, "{}", outcome.table());
+    assert!(outcome.success.successes >= 49, "{}", outcome.table());
 }
 
 /// A stiff, well damped contact pushes the tip off before the contact decision has settled. The

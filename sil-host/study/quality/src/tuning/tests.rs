@@ -58,6 +58,17 @@ fn a_search_improves_gains_that_are_off_and_does_not_depend_on_threads_or_pauses
 
 #[test]
 fn from_gains_off_by_three_the_objective_of_the_built_in_ones_is_found() {
+    is_found_from([3.0, 1.0 / 3.0, 3.0]);
+}
+
+#[test]
+#[ignore = "a second start"]
+fn from_gains_off_by_a_third_the_objective_of_the_built_in_ones_is_found() {
+    is_found_from([1.0 / 3.0, 3.0, 1.0 / 3.0]);
+}
+
+/// Asserts that a search finds the objective of the built-in gains from these multiples of them.
+fn is_found_from(factors: [f64; 3]) {
     let keys = [
         ("position_gain_per_s2", 5800.0),
         ("velocity_gain_per_s", 128.0),
@@ -65,7 +76,7 @@ fn from_gains_off_by_three_the_objective_of_the_built_in_ones_is_found() {
     ];
     let built_in = Scenario::load("hybrid-elbow-down", &[]).unwrap();
     let law = "controller.law.hybrid";
-    let off = keys.iter().zip([3.0, 1.0 / 3.0, 3.0]);
+    let off = keys.iter().zip(factors);
     let off = off.map(|((key, gain), factor)| format!("{law}.{key}={}", gain * factor));
     let range = |(key, gain)| format!("{law}.{key}={}:{}", gain / 10.0, gain * 10.0);
     let tuning = Tuning {
