@@ -11,11 +11,10 @@ use crate::{boards, build_fw};
 const TARGET: &str = "target/examples";
 
 /// A firmware that is not ours, with the controller in it.
-const OWN_FIRMWARE: [&str; 3] = [
-    "--locked",
-    "--manifest-path",
-    "examples/own-firmware/Cargo.toml",
-];
+const OWN_FIRMWARE: &str = "examples/own-firmware/Cargo.toml";
+
+/// Arguments of Cargo for it.
+const OF_OWN_FIRMWARE: [&str; 3] = ["--locked", "--manifest-path", OWN_FIRMWARE];
 
 /// The targets for which it is built, and what of it: `cortex-m-rt`, with which its program starts, is for ARM. The
 /// first is that of the boards.
@@ -38,7 +37,7 @@ fn own_firmware_for(chips: &[(&str, &str)]) -> Result<(), ChoreError> {
     for &(chip, part) in chips {
         build_fw::build(
             chip,
-            &[&[part], &OWN_FIRMWARE[..]].concat(),
+            &[&[part], &OF_OWN_FIRMWARE[..]].concat(),
             TARGET,
             "debug",
             &[],
@@ -55,7 +54,7 @@ fn own_firmware_for(chips: &[(&str, &str)]) -> Result<(), ChoreError> {
 pub fn run() -> Result<(), ChoreError> {
     own_firmware_for(&CHIPS)?;
     let test = ["test", "--lib", "--target-dir", TARGET];
-    run_cargo(&[&test[..], &OWN_FIRMWARE].concat())?;
+    run_cargo(&[&test[..], &OF_OWN_FIRMWARE].concat())?;
     for manifest in manifests()? {
         let manifest_path = manifest.to_string_lossy();
         let of_example = ["--locked", "--release", "--manifest-path", &manifest_path];
@@ -84,7 +83,7 @@ fn manifests() -> Result<Vec<PathBuf>, ChoreError> {
     let mut manifests = Vec::new();
     for entry in fs::read_dir(&folder).map_err(error)? {
         let manifest = entry.map_err(error)?.path().join("Cargo.toml");
-        if manifest.is_file() && !manifest.ends_with(OWN_FIRMWARE[2]) {
+        if manifest.is_file() && !manifest.ends_with(OWN_FIRMWARE) {
             manifests.push(manifest);
         }
     }
