@@ -64,7 +64,10 @@ fn the_command_writes_its_report() {
     };
     for step in ["identity", "options", "ticks", "line", "enable"] {
         let is_excused = step == "line" && longest_behind > SILENCE;
-        assert!(passed(step) || is_excused, "{step}: {text}");
+        assert!(
+            passed(step) || is_excused,
+            "{step}, the board at most {longest_behind:?} behind: {text}"
+        );
     }
     let written = std::fs::read_to_string(folder.path("report.json")).unwrap();
     assert_eq!(
