@@ -14,10 +14,6 @@ use crate::accept::{FIRST_SEED, board};
 /// Longest time of the command, on a machine that is busy.
 const LIMIT: Duration = Duration::from_secs(300);
 
-/// Time by which the emulated board must fall behind, without catching up, to be silent for longer than the command waits: the
-/// flood of the step `line` takes half of that second.
-const SILENCE: Duration = Duration::from_millis(500);
-
 /// On a busy machine the emulated board is slower than real time, which steps by the host's clock may find.
 #[test]
 #[ignore = "takes longer than 20 s"]
@@ -32,7 +28,6 @@ fn the_command_writes_its_report() {
     let mut child = command.spawn().unwrap();
     let start = Instant::now();
     let mut due = start;
-    let (mut behind, mut longest_behind) = (Duration::ZERO, Duration::ZERO);
     let mut bytes = [0; 1024];
     while child.try_wait().unwrap().is_none() {
         assert!(start.elapsed() < LIMIT, "the command does not end");
@@ -42,16 +37,8 @@ fn the_command_writes_its_report() {
         }
         board.machine.run_for(MILLISECOND);
         near.write_all(&board.take_sent()).unwrap();
-        due += Duration::from_millis(1);
-        let now = Instant::now();
-        if now < due {
-            behind = Duration::ZERO;
-            std::thread::sleep(due - now);
-        } else {
-            behind += now - due;
-            longest_behind = longest_behind.max(behind);
-            due = now;
-        }
+        due = (due + Duration::from_millis(1)).max(Instant::now());
+        std::thread::sleep(due.saturating_duration_since(Instant::now()));
     }
     let output = child.wait_with_output().unwrap();
     let text = painleve_tests::errors(&output);
@@ -63,11 +50,7 @@ fn the_command_writes_its_report() {
         step["verdict"] == "passed"
     };
     for step in ["identity", "options", "ticks", "line", "enable"] {
-        let is_excused = step == "line" && longest_behind > SILENCE;
-        assert!(
-            passed(step) || is_excused,
-            "{step}, the board at most {longest_behind:?} behind: {text}"
-        );
+        assert!(passed(step), "{step}: {text}");
     }
     let written = std::fs::read_to_string(folder.path("report.json")).unwrap();
     assert_eq!(
