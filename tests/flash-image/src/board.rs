@@ -309,6 +309,11 @@ impl<C: BoardChip> EmulatedBoard<C> {
             .collect()
     }
 
+    /// Returns whether the line to the board takes more bytes: those on it pass within a millisecond.
+    pub fn line_takes_more(&self) -> bool {
+        self.line_free <= self.machine.now() + MILLISECOND
+    }
+
     /// Queues bytes on the line to the board.
     pub fn send_bytes(&mut self, bytes: &[u8]) {
         let start = self.machine.now().max(self.line_free);
