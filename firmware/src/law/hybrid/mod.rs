@@ -76,7 +76,7 @@ pub struct HybridState {
     force_integral_n: f32,
     /// Gain times ∫ (z_t* − z_t) dt, m/s².
     position_integral_m_s2: f32,
-    /// Low-passed f_t, or its difference to the estimated friction, N.
+    /// Low-passed difference of f_t to the estimated friction, N.
     filtered_friction_n: f32,
     /// Slip direction of the last friction feed-forward.
     slip: Option<Slip>,
@@ -226,12 +226,6 @@ impl HybridSettings {
     ) -> f32 {
         match self.friction {
             FrictionFeedForward::Measured => input.contact.force_n.x,
-            FrictionFeedForward::Filtered { time_constant_s } => {
-                let weight = input.tick_s / (time_constant_s + input.tick_s);
-                state.filtered_friction_n +=
-                    weight * (input.contact.force_n.x - state.filtered_friction_n);
-                state.filtered_friction_n
-            }
             FrictionFeedForward::Observed { time_constant_s } => {
                 let friction = &input.contact.friction;
                 // In stick the friction force follows the feed-forward. Feeding forward the friction

@@ -8,11 +8,6 @@ settings! {
     pub enum FrictionFeedForward {
         /// The last reading of the force cell, as in the paper.
         "measured" => Measured,
-        /// The reading through a first-order low-pass.
-        "filtered" => Filtered {
-            /// Time constant τ.
-            time_constant_s: f32, 0.0..=10.0, "s";
-        },
         /// The estimated friction −μ̂ s α_f, corrected by the low-passed reading: d̂ += k (f_t + μ̂
         /// s α_f − d̂) with k = min(T/(τ + T), ⅓ p̂/Q22). The pole of the loop through the contact, 1 − k
         /// Q22/p, then stays at ⅔ or above even close to the edge.

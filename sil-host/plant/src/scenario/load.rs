@@ -209,7 +209,7 @@ mod tests {
             ),
             (
                 "controller.law.hybrid.friction=foo",
-                "friction: unknown name 'foo'; known: measured, filtered, observed, model",
+                "friction: unknown name 'foo'; known: measured, observed, model",
             ),
             (
                 "controller.law.pid=3",

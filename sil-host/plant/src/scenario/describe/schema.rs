@@ -157,7 +157,7 @@ mod tests {
             "[arm]\nlink_length_m = [0.2]",
             "[controller]\nlaw = \"pid\"",
             "[controller]\nreference = [{ jump = { target_m = 0.1 } }]",
-            "[controller.law.hybrid]\nfriction = { filtered = {} }",
+            "[controller.law.hybrid]\nfriction = { observed = {} }",
         ] {
             assert!(validate(text).is_err(), "{text}");
         }
