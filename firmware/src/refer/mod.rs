@@ -117,7 +117,10 @@ impl References {
             self.governor.restart(tip_t_m);
         }
         Target {
-            reference: if drives {
+            reference: if recovering {
+                // It stays where the tip left it, and starts again from where the tip lands.
+                self.governor.present()
+            } else if drives {
                 self.governor.govern(&wanted)
             } else {
                 wanted

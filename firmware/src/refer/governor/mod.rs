@@ -92,6 +92,11 @@ impl EdgeGovernor {
         self.found_for == Some((posture, landing_p_ratio))
     }
 
+    /// Returns the last reference at rest: the position to hold while nothing can follow.
+    pub fn present(&self) -> TipReference {
+        TipReference::at_rest(self.position_m)
+    }
+
     /// Returns whether an edge holds the reference back.
     pub fn is_at_edge(&self) -> bool {
         self.at_edge
