@@ -1,8 +1,8 @@
 //! Converts a law's torque to counts: checked, limited and rounded.
 
+use painleve_shared::JointTorque;
 use painleve_shared::counts::{LinearConverter, LinearScale, TorqueCounts};
 use painleve_shared::status::Fault;
-use painleve_shared::{JointTorque, Real};
 
 use crate::last_command::LastCommand;
 use crate::law::LawOutput;
@@ -11,16 +11,16 @@ use crate::law::LawOutput;
 #[derive(Clone, Copy, Debug)]
 pub struct TorqueOutput {
     converter: LinearConverter<f32>,
-    limit_nm: f32,
+    /// Largest torque, counts.
+    limit: i32,
 }
 
 impl TorqueOutput {
     /// Makes an output with this scale, of which ±`limit_nm` (N·m) is used.
     pub fn new(scale: LinearScale<f32>, limit_nm: f32) -> Self {
-        Self {
-            converter: scale.converter(),
-            limit_nm,
-        }
+        let converter = scale.converter();
+        let (limit, _) = converter.counts(limit_nm);
+        Self { converter, limit }
     }
 
     /// Converts a law's answer at one tick to a command: limits the desired torques and rounds them to counts.
@@ -30,22 +30,26 @@ impl TorqueOutput {
     #[inline]
     pub fn tick(&self, command: &mut LastCommand, output: &LawOutput) -> Result<(), Fault> {
         let wanted_nm = output.torque_nm;
-        // Check before clamping, which would turn an infinity into a limit.
-        if !(wanted_nm.first().is_finite() && wanted_nm.second().is_finite()) {
+        // Check before clamping, which would turn an infinity into a limit. The sum is finite only if both are.
+        if !(wanted_nm.first() + wanted_nm.second()).is_finite() {
             return Err(Fault::NotFinite);
         }
         // Carry the rounding remainder to the next tick: near the edge, where p is small, half a
         // count of constant torque would cause one newton of force.
-        let owed = (wanted_nm + command.rounding_nm).map(|torque| torque.within(self.limit_nm));
-        let converter = &self.converter;
-        let (counts_1, over_1) = converter.counts(owed.first());
-        let (counts_2, over_2) = converter.counts(owed.second());
-        let given = JointTorque::new(converter.value(counts_1), converter.value(counts_2));
-        let half = 0.5 * converter.per_count;
-        command.counts = [TorqueCounts(counts_1), TorqueCounts(counts_2)];
-        command.torque_nm = given;
-        command.saturated = over_1 || over_2 || wanted_nm.amax() > self.limit_nm;
-        command.rounding_nm = (owed - given).map(|rest| rest.within(half));
+        let owed = wanted_nm + command.rounding_nm;
+        let nearest = owed.to_array().map(|torque| self.converter.nearest(torque));
+        let counts = nearest.map(|counts| counts.max(-self.limit).min(self.limit));
+        let given = counts.map(|counts| self.converter.value(counts));
+        command.counts = counts.map(TorqueCounts);
+        command.torque_nm = JointTorque::from_array(given);
+        command.saturated = counts != nearest;
+        // What the limit withholds is not owed.
+        let withheld = (owed - command.torque_nm).to_array();
+        let rounding = [0, 1].map(|joint| {
+            let is_limited = counts[joint] != nearest[joint];
+            if is_limited { 0.0 } else { withheld[joint] }
+        });
+        command.rounding_nm = JointTorque::from_array(rounding);
         command.contact_force_n = output.contact_force_n;
         Ok(())
     }

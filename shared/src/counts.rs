@@ -229,10 +229,16 @@ impl<T: Real> LinearConverter<T> {
         size <= self.maximum_counts
     }
 
+    /// Returns the nearest whole number of counts, even if it is none of the converter's readings; NaN gives 0.
+    #[inline]
+    pub fn nearest(&self, value: T) -> i32 {
+        round_to_i32(value / self.per_count)
+    }
+
     /// Returns the nearest reading, and whether it was clamped; NaN gives 0.
     #[inline]
     pub fn counts(&self, value: T) -> (i32, bool) {
-        let wanted = round_to_i32(value / self.per_count);
+        let wanted = self.nearest(value);
         // Unlike `clamp`, this cannot panic.
         let counts = wanted.max(!self.maximum_counts).min(self.maximum_counts);
         (counts, counts != wanted)
