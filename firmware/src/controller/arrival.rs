@@ -65,19 +65,19 @@ fn irregular(
     ahead: u32,
     (encoders, forces): (bool, bool),
 ) -> Arrival {
-    let (first, lapses) = (&mut None, &mut supervisor.lapses);
+    let mut note = |lapse: Lapse, times: u32| supervisor.note(lapse, times);
     for (input, lapse) in BOARD_LAPSES {
-        lapses.note_among(first, lapse, u32::from(frame.inputs.contains(input)));
+        note(lapse, u32::from(frame.inputs.contains(input)));
     }
     // More than half the counter's range ahead means behind.
     let stale = ahead == 0 || ahead > u32::MAX / 2;
-    lapses.note_among(first, Lapse::StaleFrame, u32::from(stale));
+    note(Lapse::StaleFrame, u32::from(stale));
     let arrival = if stale {
         Arrival::Stale
     } else {
-        lapses.note_among(first, Lapse::LostFrame, ahead - 1);
-        lapses.note_among(first, Lapse::EncoderOutOfRange, u32::from(!encoders));
-        lapses.note_among(first, Lapse::ForceOutOfRange, u32::from(!forces));
+        note(Lapse::LostFrame, ahead - 1);
+        note(Lapse::EncoderOutOfRange, u32::from(!encoders));
+        note(Lapse::ForceOutOfRange, u32::from(!forces));
         let ticks = ahead.saturating_add(state.unread_ticks);
         if encoders && forces {
             state.unread_ticks = 0;
@@ -87,9 +87,6 @@ fn irregular(
             Arrival::OutOfRange
         }
     };
-    if let Some(lapse) = first {
-        supervisor.latch(lapse.fault());
-    }
     // A sender that has started anew counts from another number: follow it once its frames have latched a fault, so that
     // it can reset the fault.
     if !stale || supervisor.fault().is_some() {

@@ -82,14 +82,14 @@ impl References {
         // The descent continues, and presses the tip gently, until contact is certain. The law's
         // whole force while in doubt would be evidence that comes and goes with the law.
         let descends = contact.in_flight || landing.is_some();
-        let recovering = phase.recovers && !contact.touches && descends;
+        let drives = phase.state.drives();
+        let recovering = drives && phase.recovers && !contact.touches && descends;
         self.asked_p_ratio = if recovering || landing.is_some() {
             self.landing_p_ratio
         } else {
             0.0
         };
         let tip_t_m = model.tip_m.x;
-        let drives = phase.state.drives();
         // While the drive is off, the edges are searched for the posture in which it would be armed.
         if phase.arms || !drives {
             self.posture = Posture::of(&model.theta_rad);

@@ -17,14 +17,14 @@ pub const BOARD_LAPSES: [(DigitalInputs, Lapse); 4] = [
 
 /// Good ticks that make up for one lapse. With two, a kind that fails at more than a third of the ticks is a fault in
 /// the end, whatever its limit; with one, a kind that fails at every other tick never would be.
-const GOOD_PER_LAPSE: u32 = 2;
+const GOOD_PER_LAPSE: i32 = 2;
 
 /// Lapses of one kind.
 #[derive(Clone, Copy, Debug, Default)]
 struct Count {
     total: u32,
-    /// Good ticks that are needed to make up for the lapses so far.
-    owed: u32,
+    /// Good ticks that are needed to make up for the lapses so far. Signed, which takes fewer instructions to keep at zero.
+    owed: i32,
 }
 
 /// Counts lapses and reports when there are too many.
@@ -43,39 +43,22 @@ impl LapseMonitor {
         }
     }
 
-    /// Records that `lapse` did not occur this time.
-    #[inline]
-    pub fn note_good(&mut self, lapse: Lapse) {
-        let owed = &mut self.counts[lapse as usize].owed;
-        *owed = owed.saturating_sub(1);
-    }
-
     /// Records how many times `lapse` occurred, 0 for none; returns whether it has now occurred too often.
     #[inline]
     #[must_use]
     pub fn note(&mut self, lapse: Lapse, times: u32) -> bool {
+        let count = &mut self.counts[lapse as usize];
         if times == 0 {
-            self.note_good(lapse);
+            count.owed = (count.owed - 1).max(0);
             return false;
         }
-        let tolerated = GOOD_PER_LAPSE * self.limits.of(lapse);
-        let count = &mut self.counts[lapse as usize];
         count.total = count.total.wrapping_add(times);
-        let owed = count
-            .owed
-            .saturating_add(GOOD_PER_LAPSE.saturating_mul(times));
+        let limit = self.limits.of(lapse);
         // One lapse too many: an outage is made up for in the same time, however long it was.
-        count.owed = owed.min(tolerated + GOOD_PER_LAPSE);
+        let [tolerated, most] = [limit, limit + 1].map(|it| GOOD_PER_LAPSE * it as i32);
+        let added = GOOD_PER_LAPSE * times.min(limit + 1) as i32;
+        count.owed = (count.owed + added).min(most);
         count.owed > tolerated
-    }
-
-    /// Records how many times one of a frame's lapses occurred, and keeps the `first` that has occurred too often.
-    // In line, because a loop over the lapses would take three times as long.
-    #[inline(always)]
-    pub(crate) fn note_among(&mut self, first: &mut Option<Lapse>, lapse: Lapse, times: u32) {
-        if self.note(lapse, times) && first.is_none() {
-            *first = Some(lapse);
-        }
     }
 
     /// Returns how often `lapse` has occurred; wraps.
@@ -102,8 +85,8 @@ mod tests {
             for _ in 0..limit {
                 assert!(!monitor.note(lapse, 1), "{lapse:?}");
             }
-            for _ in 0..GOOD_PER_LAPSE * limit {
-                monitor.note_good(lapse);
+            for _ in 0..2 * limit {
+                assert!(!monitor.note(lapse, 0));
             }
             assert!(!monitor.note(lapse, limit));
             for other in Lapse::ALL.iter().copied().filter(|other| *other != lapse) {
@@ -141,8 +124,8 @@ mod tests {
         let lapse = Lapse::MissingFrame;
         let limit = LapseLimits::default().of(lapse);
         assert!(monitor.note(lapse, u32::MAX));
-        for _ in 0..GOOD_PER_LAPSE * (limit + 1) {
-            monitor.note_good(lapse);
+        for _ in 0..2 * (limit + 1) {
+            assert!(!monitor.note(lapse, 0));
         }
         assert!(!monitor.note(lapse, limit));
     }

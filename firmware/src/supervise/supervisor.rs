@@ -76,7 +76,7 @@ pub struct Phase {
     pub arms: bool,
     /// Whether tracking has just started, for the first time since the drive was armed.
     pub starts_tracking: bool,
-    /// Whether a tip in the air is to be returned to the belt.
+    /// Whether a drive that is on returns a tip in the air to the belt.
     pub recovers: bool,
 }
 
@@ -99,18 +99,7 @@ impl Supervisor {
     /// Advances one tick; `has_law` states whether there is a law to arm.
     #[inline]
     pub fn tick(&mut self, inputs: DigitalInputs, contact: bool, has_law: bool) -> Phase {
-        let before = self.state;
-        self.advance(inputs, contact, has_law);
-        let state = self.state;
-        Phase {
-            state,
-            arms: state == SupervisorState::Armed && before != state,
-            starts_tracking: state == SupervisorState::Tracking && before == SupervisorState::Armed,
-            recovers: self.settings.on_lift_off == OnLiftOff::Recover && self.drives(),
-        }
-    }
-
-    fn advance(&mut self, inputs: DigitalInputs, contact: bool, has_law: bool) {
+        let (mut arms, mut starts_tracking) = (false, false);
         let before = core::mem::replace(&mut self.inputs, inputs);
         let rises = |bit| inputs.contains(bit) && !before.contains(bit);
         let enabled = inputs.contains(DigitalInputs::ENABLE);
@@ -127,6 +116,7 @@ impl Supervisor {
                 if rises(DigitalInputs::ENABLE) && has_law {
                     self.lift_offs = 0;
                     self.enter(SupervisorState::Armed);
+                    arms = true;
                 }
             }
             _ if !enabled => self.enter(SupervisorState::Idle),
@@ -138,6 +128,7 @@ impl Supervisor {
                 };
                 if self.exceeds(self.contact_ticks, self.settings.arming_s) {
                     self.enter(SupervisorState::Tracking);
+                    starts_tracking = true;
                 } else if self.exceeds(self.ticks, self.settings.arming_limit_s) {
                     self.latch(Fault::ContactNotFound);
                 }
@@ -169,6 +160,12 @@ impl Supervisor {
                 }
             }
         }
+        Phase {
+            state: self.state,
+            arms,
+            starts_tracking,
+            recovers: self.settings.on_lift_off == OnLiftOff::Recover,
+        }
     }
 
     /// Returns whether a count of ticks has exceeded `time_s`.
@@ -197,8 +194,7 @@ impl Supervisor {
     pub fn note(&mut self, lapse: Lapse, times: u32) -> bool {
         // Nearly all calls record no lapse: return early.
         if times == 0 {
-            self.lapses.note_good(lapse);
-            false
+            self.lapses.note(lapse, 0)
         } else {
             self.note_bad(lapse, times)
         }
