@@ -38,14 +38,14 @@ pub(super) fn arrive(
         .last_sequence
         .unwrap_or(frame.sequence.wrapping_sub(1));
     let ahead = frame.sequence.wrapping_sub(last);
-    let readable = estimates.readable(frame);
     if ahead != 1
-        || readable != (true, true)
+        || !estimates.can_read_encoders(frame)
+        || !estimates.can_read_forces(frame)
         || BOARD_LAPSES
             .iter()
             .any(|(input, _)| frame.inputs.contains(*input))
     {
-        return irregular(state, supervisor, frame, ahead, readable);
+        return irregular(state, supervisor, estimates, frame, ahead);
     }
     state.last_sequence = Some(frame.sequence);
     for lapse in Lapse::OF_FRAMES {
@@ -61,10 +61,14 @@ pub(super) fn arrive(
 fn irregular(
     state: &mut ArrivalState,
     supervisor: &mut Supervisor,
+    estimates: &Estimators,
     frame: &SensorFrame,
     ahead: u32,
-    (encoders, forces): (bool, bool),
 ) -> Arrival {
+    let (encoders, forces) = (
+        estimates.can_read_encoders(frame),
+        estimates.can_read_forces(frame),
+    );
     let mut note = |lapse: Lapse, times: u32| supervisor.note(lapse, times);
     for (input, lapse) in BOARD_LAPSES {
         note(lapse, u32::from(frame.inputs.contains(input)));

@@ -12,7 +12,7 @@ use crate::estimate::belt::BeltEstimator;
 use crate::estimate::calibration::LengthCalibrator;
 use crate::estimate::contact::ContactDetector;
 use crate::estimate::disturbance::DisturbanceEstimator;
-use crate::estimate::friction::FrictionEstimator;
+use crate::estimate::friction::{FrictionEstimate, FrictionEstimator};
 use crate::estimate::joint_friction::JointFriction;
 use crate::estimate::joints::{JointEstimator, JointEstimatorSettings, Restart};
 use crate::estimate::model::Model;
@@ -33,19 +33,19 @@ use crate::torque_output::TorqueOutput;
 #[derive(Clone, Debug)]
 #[repr(C)]
 pub struct Stages<L: Law> {
-    /// What is known of arm, contact and belt.
-    pub estimates: Estimators,
     command: LastCommand,
     demand: TorqueDemand<L>,
+    torques: TorqueOutput,
+    /// What is known of arm, contact and belt.
+    pub estimates: Estimators,
+    references: References,
     /// Whether the arm is driven, and the latched fault.
     pub supervisor: Supervisor,
-    references: References,
     /// The tick that has been answered, for its update.
     observed: Observed,
     turn: Turn,
     /// What has arrived.
     pub arrivals: ArrivalState,
-    torques: TorqueOutput,
 }
 
 impl<L: Law> Stages<L> {
@@ -61,7 +61,10 @@ impl<L: Law> Stages<L> {
         let (torque_limit_nm, [link_length_m, _]) = (settings.torque_limit_nm, arm.link_length_m());
         let force_cell = converters.force.converter();
         let estimates = Estimators {
-            contact: ContactEstimate::default(),
+            contact: ContactEstimate {
+                friction: FrictionEstimate::first(&settings.friction),
+                ..ContactEstimate::default()
+            },
             model: Model::default(),
             arm,
             joints: JointEstimator::new(&joints, converters.encoders, tick_hz),
@@ -118,7 +121,6 @@ impl<L: Law> Stages<L> {
             self.supervisor.latch(Fault::EncoderJump);
         }
         let contact = &self.estimates.contact;
-        self.observed.drove = self.supervisor.drives();
         let phase = self
             .supervisor
             .tick(frame.inputs, contact.touches, self.demand.is_on());
@@ -189,6 +191,7 @@ impl<L: Law> Stages<L> {
         let drives = self.supervisor.drives();
         self.estimates.prepare(&mut self.command, drives);
         self.references.prepare(self.supervisor.state());
+        self.observed.drove = drives;
         self.observed.torque_nm = self.command.torque_nm;
         self.observed.rounding_nm = self.command.rounding_nm;
         self.observed.saturated = self.command.saturated;
@@ -198,6 +201,7 @@ impl<L: Law> Stages<L> {
     pub fn release(&mut self) {
         self.command = LastCommand::default();
         self.demand.flight = None;
+        self.observed.drove = false;
     }
 }
 

@@ -79,13 +79,22 @@ pub struct FrictionEstimate {
 }
 
 impl FrictionEstimate {
+    /// Returns the estimate before the first reading.
+    pub fn first(settings: &FrictionSettings) -> Self {
+        Self {
+            coefficient: settings.first_guess,
+            variance: settings.first_deviation * settings.first_deviation,
+            ..Self::default()
+        }
+    }
+
     /// Returns the standard deviation of μ̂.
     pub fn deviation(&self) -> f32 {
         self.variance.square_root()
     }
 }
 
-/// The filter with its settings.
+/// The filter with its settings. The estimate itself is part of what is known of the contact.
 #[derive(Clone, Copy, Debug)]
 pub struct FrictionEstimator {
     /// Normal force below which friction is not observed, N.
@@ -98,7 +107,6 @@ pub struct FrictionEstimator {
     clear_force_n2: f32,
     /// Weight of one innovation in their average.
     mean_weight: f32,
-    estimate: FrictionEstimate,
     /// Ticks in a row that indicate a slip in the opposite direction.
     contrary_ticks: u8,
     /// Whether the next reading may show another slip.
@@ -122,8 +130,6 @@ struct Correction {
     innovation: f32,
     /// Gain of the filter.
     gain: f32,
-    /// Normal force, N.
-    normal_force_n: f32,
 }
 
 impl FrictionEstimator {
@@ -140,11 +146,6 @@ impl FrictionEstimator {
             // Three standard deviations.
             clear_force_n2: 9.0 * force_variance_n2,
             mean_weight: tick_s / (MEAN_S + tick_s),
-            estimate: FrictionEstimate {
-                coefficient: settings.first_guess,
-                variance: first_variance,
-                ..Default::default()
-            },
             contrary_ticks: 0,
             slip_in_doubt: true,
             correction: None,
@@ -155,14 +156,18 @@ impl FrictionEstimator {
         }
     }
 
-    /// Corrects the estimate with one reading (f_t, f_n), N, of a tip in contact; `is_dragged` returns whether its
+    /// Corrects the `estimate` with one reading (f_t, f_n), N, of a tip in contact; `is_dragged` returns whether its
     /// motion allows stick.
     #[inline]
-    pub fn correct(&mut self, force_n: &Vector2<f32>, is_dragged: impl FnOnce(Slip) -> bool) {
+    pub fn correct(
+        &mut self,
+        estimate: &mut FrictionEstimate,
+        force_n: &Vector2<f32>,
+        is_dragged: impl FnOnce(Slip) -> bool,
+    ) {
         if self.slip_in_doubt {
-            self.observe_slip(force_n);
+            self.observe_slip(estimate, force_n);
         }
-        let estimate = &mut self.estimate;
         let normal_n = force_n.y;
         if normal_n < self.observable_n {
             estimate.sticks = false;
@@ -188,20 +193,15 @@ impl FrictionEstimator {
         let change = gain * innovation;
         estimate.coefficient = (estimate.coefficient + change).at_least(0.0);
         estimate.catch_up = MISSED_TICKS * change;
-        self.correction = Some(Correction {
-            innovation,
-            gain,
-            normal_force_n: normal_n,
-        });
+        self.correction = Some(Correction { innovation, gain });
     }
 
-    /// Updates variances and slip after the tip has touched at a tick, with its reading.
+    /// Updates variances and slip of the `estimate` after the tip has touched at a tick, with its reading.
     #[inline]
-    pub fn update(&mut self, force_n: &Vector2<f32>) {
+    pub fn update(&mut self, estimate: &mut FrictionEstimate, force_n: &Vector2<f32>) {
         if let Some(correction) = self.correction.take() {
-            self.adapt(correction);
+            self.adapt(estimate, correction, force_n.y);
         }
-        let estimate = &mut self.estimate;
         estimate.catch_up = 0.0;
         let variance = estimate.variance + self.drift_variance;
         estimate.variance = variance.at_most(self.first_variance);
@@ -209,16 +209,16 @@ impl FrictionEstimator {
             self.force_variance_n2 * (1.0 + estimate.coefficient * estimate.coefficient);
         // A reading that could decide has been considered before its tick was answered.
         if !self.slip_in_doubt {
-            self.observe_slip(force_n);
+            self.observe_slip(estimate, force_n);
         }
-        self.slip_in_doubt = !self.estimate.slip_seen || self.contrary_ticks + 1 >= REVERSAL_TICKS;
+        self.slip_in_doubt = !estimate.slip_seen || self.contrary_ticks + 1 >= REVERSAL_TICKS;
     }
 
-    /// Adapts the variances to a correction.
-    fn adapt(&mut self, correction: Correction) {
-        let (innovation, normal_n) = (correction.innovation, correction.normal_force_n);
+    /// Adapts the variances to a correction at this normal force, N.
+    fn adapt(&mut self, estimate: &mut FrictionEstimate, correction: Correction, normal_n: f32) {
+        let innovation = correction.innovation;
         let ratio_variance = self.reading_variance_n2 / (normal_n * normal_n);
-        self.estimate.variance *= 1.0 - correction.gain;
+        estimate.variance *= 1.0 - correction.gain;
         // Innovations that keep their sign are not noise: μ has changed.
         let weight = self.mean_weight;
         let change = innovation - self.innovation;
@@ -231,15 +231,14 @@ impl FrictionEstimator {
         let ratio_variance = self.noise_variance.limited(least_variance, ratio_variance);
         self.mean_innovation += weight * (innovation - self.mean_innovation);
         let square = self.mean_innovation * self.mean_innovation;
-        if square > SIGNIFICANT_SQUARE * (self.estimate.variance + ratio_variance) * weight {
-            self.estimate.variance = self.estimate.variance.at_least(square);
+        if square > SIGNIFICANT_SQUARE * (estimate.variance + ratio_variance) * weight {
+            estimate.variance = estimate.variance.at_least(square);
         }
     }
 
     // Out of line: few readings can decide before their tick is answered.
     #[inline(never)]
-    fn observe_slip(&mut self, force_n: &Vector2<f32>) {
-        let estimate = &mut self.estimate;
+    fn observe_slip(&mut self, estimate: &mut FrictionEstimate, force_n: &Vector2<f32>) {
         let slip = Slip::of(-force_n.x);
         // Below the noise level the sign carries no information.
         let clear = force_n.x * force_n.x > self.clear_force_n2;
@@ -256,14 +255,9 @@ impl FrictionEstimator {
 
     /// Forgets how well μ is known: a tip that has left the belt may have been thrown off by more friction than
     /// estimated. It will land at rest, with the slip `at_rest` if that is known.
-    pub fn leave(&mut self, at_rest: Option<Slip>) {
-        self.estimate.variance = self.first_variance;
-        self.estimate.slip = at_rest.unwrap_or(self.estimate.slip);
-    }
-
-    /// Returns the present estimate.
-    pub fn estimate(&self) -> &FrictionEstimate {
-        &self.estimate
+    pub fn leave(&self, estimate: &mut FrictionEstimate, at_rest: Option<Slip>) {
+        estimate.variance = self.first_variance;
+        estimate.slip = at_rest.unwrap_or(estimate.slip);
     }
 }
 

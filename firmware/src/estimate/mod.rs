@@ -45,7 +45,7 @@ use crate::schedule::Turn;
 pub struct Observed {
     /// Ticks since the previous readings: 1 unless frames were lost.
     pub elapsed_ticks: u32,
-    /// Whether torque was applied before the tick.
+    /// Whether torque was applied until the tick.
     pub drove: bool,
     /// Torque until the tick, N·m.
     pub torque_nm: JointTorque<f32>,
@@ -69,23 +69,27 @@ pub struct Estimators {
     pub(crate) decision: ContactDetector,
     pub(crate) friction: FrictionEstimator,
     pub(crate) belt: BeltEstimator,
+    pub(crate) force_cell: LinearConverter<f32>,
+    /// Largest reading of the force cell, N.
+    pub(crate) force_range_n: f32,
     pub(crate) response: ResponseEstimator,
     pub(crate) disturbance: DisturbanceEstimator,
     pub(crate) calibrator: LengthCalibrator,
     pub(crate) joint_friction: JointFriction,
-    pub(crate) force_cell: LinearConverter<f32>,
-    /// Largest reading of the force cell, N.
-    pub(crate) force_range_n: f32,
 }
 
 impl Estimators {
-    /// Returns whether the encoders, and whether the force cell, can give a frame's readings.
+    /// Returns whether the encoders can give a frame's readings.
     #[inline]
-    pub fn readable(&self, frame: &SensorFrame) -> (bool, bool) {
+    pub fn can_read_encoders(&self, frame: &SensorFrame) -> bool {
+        self.joints.can_read(frame.joints)
+    }
+
+    /// Returns whether the force cell can give a frame's readings.
+    #[inline]
+    pub fn can_read_forces(&self, frame: &SensorFrame) -> bool {
         let force_cell = &self.force_cell;
-        let forces = force_cell.contains(frame.normal_force.0)
-            && force_cell.contains(frame.tangential_force.0);
-        (self.joints.can_read(frame.joints), forces)
+        force_cell.contains(frame.normal_force.0) && force_cell.contains(frame.tangential_force.0)
     }
 
     /// Corrects the predicted state of the arm with a frame's readings, `elapsed_ticks` after the previous ones, and
@@ -154,10 +158,11 @@ impl Estimators {
                 let falls_behind = slip.sign::<f32>() * lag_m_s > 2.0 * BOUND_ERROR_M_S;
                 falls_behind && self.belt.may_stick(tip_velocity_m_s)
             };
-            self.friction.correct(&self.contact.force_n, is_dragged);
+            let contact = &mut self.contact;
+            self.friction
+                .correct(&mut contact.friction, &contact.force_n, is_dragged);
         }
         let contact = &mut self.contact;
-        contact.friction = *self.friction.estimate();
         contact.p_per_kg = self
             .model
             .p_per_kg(contact.friction.coefficient, contact.friction.slip);
@@ -175,11 +180,12 @@ impl Estimators {
     #[inline]
     pub fn learn_in_contact(&mut self, observed: &Observed, turn: Turn) -> bool {
         let is_informative = self.add_to_balance(observed);
-        let (model, contact) = (&self.model, &self.contact);
-        if self.is_in_range() {
-            self.friction.update(&contact.force_n);
+        let is_in_range = self.is_in_range();
+        let (model, contact) = (&self.model, &mut self.contact);
+        let friction = &mut contact.friction;
+        if is_in_range {
+            self.friction.update(friction, &contact.force_n);
         }
-        let friction = self.friction.estimate();
         self.belt.update(model.tip_velocity_m_s.x, Some(friction));
         let p_per_kg = contact.p_per_kg;
         let slides = p_per_kg > 0.0 && !friction.sticks;
@@ -216,7 +222,8 @@ impl Estimators {
     #[inline]
     pub fn learn_in_the_air(&mut self, observed: &Observed, turn: Turn) {
         if self.contact.leaves {
-            self.friction.leave(self.belt.slip_at_rest());
+            let at_rest = self.belt.slip_at_rest();
+            self.friction.leave(&mut self.contact.friction, at_rest);
         }
         let tip_velocity_m_s = self.model.tip_velocity_m_s.x;
         self.belt.update(tip_velocity_m_s, None);
@@ -276,11 +283,9 @@ impl Estimators {
             &disturbance_nm,
         );
         let (model, contact) = (&self.model, &mut self.contact);
-        let friction = self.friction.estimate();
-        let p_per_kg = model.p_per_kg(friction.coefficient, friction.slip);
+        let p_per_kg = model.p_per_kg(contact.friction.coefficient, contact.friction.slip);
         let p_ratio = p_per_kg / model.q22_per_kg;
         let response = self.response.response(p_per_kg, p_ratio);
-        contact.friction = *friction;
         contact.p_per_kg = p_per_kg;
         contact.p_ratio = p_ratio;
         contact.response = response;

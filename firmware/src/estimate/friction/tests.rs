@@ -26,16 +26,28 @@ fn slide(tested: &mut Tested, friction: f32, slip: Slip, ticks: u32) {
     }
 }
 
-/// An estimator, and whether the tip is dragged along by the belt.
-struct Tested(FrictionEstimator, bool);
+/// An estimator with its estimate.
+struct Tested {
+    estimator: FrictionEstimator,
+    estimate: FrictionEstimate,
+    /// Whether the tip is dragged along by the belt.
+    is_dragged: bool,
+}
 
 impl Tested {
     fn new(first_guess: f32) -> Self {
-        let settings = FrictionSettings {
+        Self::with(&FrictionSettings {
             first_guess,
             ..Default::default()
-        };
-        Self(FrictionEstimator::new(&settings, &cell(), 1e-3), false)
+        })
+    }
+
+    fn with(settings: &FrictionSettings) -> Self {
+        Self {
+            estimator: FrictionEstimator::new(settings, &cell(), 1e-3),
+            estimate: FrictionEstimate::first(settings),
+            is_dragged: false,
+        }
     }
 
     fn update(&mut self, force_n: &Vector2<f32>) {
@@ -44,15 +56,11 @@ impl Tested {
 
     /// Updates, and returns what the tick's answer catches up with.
     fn catch_up(&mut self, force_n: &Vector2<f32>) -> f32 {
-        let is_dragged = self.1;
-        self.0.correct(force_n, |_| is_dragged);
-        let catch_up = self.0.estimate().catch_up;
-        self.0.update(force_n);
+        let (estimate, is_dragged) = (&mut self.estimate, self.is_dragged);
+        self.estimator.correct(estimate, force_n, |_| is_dragged);
+        let catch_up = estimate.catch_up;
+        self.estimator.update(estimate, force_n);
         catch_up
-    }
-
-    fn estimate(&self) -> FrictionEstimate {
-        *self.0.estimate()
     }
 }
 
@@ -64,7 +72,7 @@ proptest! {
         let slip = if positive { Slip::Positive } else { Slip::Negative };
         let mut tested = Tested::new(friction * wrong);
         slide(&mut tested, friction, slip, 100);
-        let found = tested.estimate();
+        let found = tested.estimate;
         prop_assert_eq!(found.slip, slip);
         prop_assert!((found.coefficient - friction).abs() < 0.01, "{:?}", found);
         prop_assert!((found.coefficient - friction).abs() < 5.0 * found.deviation());
@@ -77,7 +85,7 @@ fn nothing_is_learnt_in_the_air() {
     for tick in 0..1000 {
         tested.update(&Vector2::new(noise(tick), 0.1));
     }
-    let found = tested.estimate();
+    let found = tested.estimate;
     assert_eq!(found.coefficient, 0.4);
     assert!((found.deviation() - FrictionSettings::default().first_deviation).abs() < 1e-3);
 }
@@ -86,22 +94,22 @@ fn nothing_is_learnt_in_the_air() {
 fn stick_does_not_lower_the_friction_estimate() {
     let mut tested = Tested::new(0.6);
     slide(&mut tested, 0.6, Slip::Positive, 200);
-    tested.1 = true;
+    tested.is_dragged = true;
     slide(&mut tested, 0.1, Slip::Positive, 4000);
-    assert!(tested.estimate().sticks);
-    assert!((tested.estimate().coefficient - 0.6).abs() < 0.01);
+    assert!(tested.estimate.sticks);
+    assert!((tested.estimate.coefficient - 0.6).abs() < 0.01);
 }
 
 #[test]
 fn only_friction_near_the_other_side_of_the_cone_reverses_the_slip() {
     let mut tested = Tested::new(0.6);
     slide(&mut tested, 0.6, Slip::Positive, 200);
-    tested.1 = true;
+    tested.is_dragged = true;
     slide(&mut tested, 0.4, Slip::Negative, 100);
-    let found = tested.estimate();
+    let found = tested.estimate;
     assert!(found.slip == Slip::Positive && found.sticks);
     slide(&mut tested, 0.6, Slip::Negative, 4);
-    let found = tested.estimate();
+    let found = tested.estimate;
     assert!(found.slip == Slip::Negative && !found.sticks);
 }
 
@@ -110,21 +118,21 @@ fn less_friction_is_learnt_at_once_unless_the_belt_drags_the_tip() {
     let mut tested = Tested::new(0.6);
     slide(&mut tested, 0.6, Slip::Positive, 2000);
     slide(&mut tested, 0.4, Slip::Positive, 5);
-    assert!(!tested.estimate().sticks);
-    assert!((tested.estimate().coefficient - 0.4).abs() < 0.02);
+    assert!(!tested.estimate.sticks);
+    assert!((tested.estimate.coefficient - 0.4).abs() < 0.02);
 }
 
 #[test]
 fn less_friction_is_learnt_as_soon_as_the_belt_no_longer_drags_the_tip() {
     let mut tested = Tested::new(0.6);
     slide(&mut tested, 0.6, Slip::Positive, 2000);
-    tested.1 = true;
+    tested.is_dragged = true;
     slide(&mut tested, 0.4, Slip::Positive, 1);
-    assert!(tested.estimate().sticks);
-    tested.1 = false;
+    assert!(tested.estimate.sticks);
+    tested.is_dragged = false;
     slide(&mut tested, 0.4, Slip::Positive, 3);
-    assert!(!tested.estimate().sticks);
-    assert!((tested.estimate().coefficient - 0.4).abs() < 0.02);
+    assert!(!tested.estimate.sticks);
+    assert!((tested.estimate.coefficient - 0.4).abs() < 0.02);
 }
 
 #[test]
@@ -135,7 +143,7 @@ fn friction_that_drifts_is_followed() {
         let friction = 0.6 + 0.1 * tick as f32 / 500.0;
         slide(&mut tested, friction, Slip::Positive, 1);
     }
-    let found = tested.estimate();
+    let found = tested.estimate;
     assert!((found.coefficient - 0.7).abs() < 0.03, "{found:?}");
 }
 
@@ -148,7 +156,7 @@ fn friction_that_varies_like_a_sine_is_followed() {
         let friction = 0.6 + 0.12 * phase.sin();
         tested.update(&Vector2::new(-10.0 * friction, 10.0));
         if tick >= 500 {
-            let error = tested.estimate().coefficient - friction;
+            let error = tested.estimate.coefficient - friction;
             square_sum += error * error;
         }
     }
@@ -162,7 +170,7 @@ fn a_small_rise_of_friction_is_learnt_in_one_tick() {
     let quiet = Vector2::new(-6.0, 10.0);
     (0..2000).for_each(|_| tested.update(&quiet));
     tested.update(&Vector2::new(-6.8, 10.0));
-    let found = tested.estimate();
+    let found = tested.estimate;
     assert!((found.coefficient - 0.68).abs() < 0.002, "{found:?}");
 }
 
@@ -190,7 +198,7 @@ fn a_change_of_friction_does_not_hide_the_next_one() {
         (0..50).for_each(|_| tested.update(&Vector2::new(-10.0 * friction, 10.0)));
         if step % 2 == 1 {
             tested.update(&Vector2::new(-6.8, 10.0));
-            let found = tested.estimate();
+            let found = tested.estimate;
             assert!((found.coefficient - 0.68).abs() < 0.005, "{found:?}");
         }
     }
@@ -201,7 +209,7 @@ fn more_friction_is_learnt_at_once() {
     let mut tested = Tested::new(0.3);
     slide(&mut tested, 0.3, Slip::Positive, 2000);
     slide(&mut tested, 0.7, Slip::Positive, 5);
-    let found = tested.estimate();
+    let found = tested.estimate;
     assert!((found.coefficient - 0.7).abs() < 0.02, "{found:?}");
 }
 
@@ -211,12 +219,14 @@ fn a_friction_that_is_not_estimated_stays_the_first_guess() {
         first_deviation: 0.0,
         ..Default::default()
     };
-    let estimator = FrictionEstimator::new(&settings, &cell(), 1e-3);
-    for (friction, drags) in [(0.3, false), (0.3, true), (0.8, false), (0.6, false)] {
-        let mut tested = Tested(estimator, drags);
+    for (friction, is_dragged) in [(0.3, false), (0.3, true), (0.8, false), (0.6, false)] {
+        let mut tested = Tested {
+            is_dragged,
+            ..Tested::with(&settings)
+        };
         for slip in [Slip::Negative, Slip::Positive] {
             slide(&mut tested, friction, slip, 2000);
-            let found = tested.estimate();
+            let found = tested.estimate;
             assert_eq!((found.coefficient, found.deviation()), (0.6, 0.0));
             assert_eq!(tested.catch_up(&Vector2::new(-9.0, 10.0)), 0.0);
             // The direction of slip still follows the force, near the other side of the cone.
@@ -238,18 +248,22 @@ fn without_noise(ticks: u32) -> Tested {
 fn a_rise_of_less_than_a_hundredth_is_not_sudden() {
     let mut tested = without_noise(3000);
     tested.update(&Vector2::new(-6.08, 10.0));
-    let learnt = tested.estimate().coefficient - 0.6;
+    let learnt = tested.estimate.coefficient - 0.6;
     assert!(learnt < 0.004, "{learnt}");
 }
 
 #[test]
 fn without_readings_the_deviation_grows_with_the_root_of_time() {
-    let Tested(mut estimator, _) = without_noise(3000);
-    let before = estimator.estimate().variance;
+    let Tested {
+        mut estimator,
+        mut estimate,
+        ..
+    } = without_noise(3000);
+    let before = estimate.variance;
     for _ in 0..1000 {
-        estimator.update(&Vector2::new(-6.0, 10.0));
+        estimator.update(&mut estimate, &Vector2::new(-6.0, 10.0));
     }
-    let grown = estimator.estimate().variance - before;
+    let grown = estimate.variance - before;
     let expected = DRIFT_PER_SQRT_S.powi(2);
     assert!(
         (grown - expected).abs() < 0.1 * expected,
