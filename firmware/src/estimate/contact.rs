@@ -123,11 +123,8 @@ impl ContactDetector {
     /// Adds to the log-odds and updates the decision.
     fn weigh(&mut self, change: f32) -> bool {
         self.log_odds = (self.log_odds + change).within(CERTAIN);
-        if self.contact {
-            self.contact = self.log_odds > -DECISION;
-        } else {
-            self.contact = self.log_odds > DECISION;
-        }
+        let threshold = if self.contact { -DECISION } else { DECISION };
+        self.contact = self.log_odds > threshold;
         self.contact
     }
 

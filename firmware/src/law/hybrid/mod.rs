@@ -62,8 +62,11 @@ fn affordable_part(
     pressing_nm: &JointTorque<f32>,
     limit_nm: f32,
 ) -> f32 {
-    // Not finite without a pressing torque: then a motion within the limit leaves enough.
-    let of_joint = |motion: f32, pressing: f32| (limit_nm.copysign(pressing) - motion) / pressing;
+    // Not finite without a pressing torque: less of none leaves no more for the motion.
+    let of_joint = |motion: f32, pressing: f32| {
+        let per_nm = 1.0 / pressing;
+        limit_nm * per_nm.abs() - motion * per_nm
+    };
     1.0_f32
         .at_most(of_joint(motion_nm.first(), pressing_nm.first()))
         .at_most(of_joint(motion_nm.second(), pressing_nm.second()))
@@ -142,8 +145,7 @@ impl Law for HybridSettings {
         // A force that rose at once would make a contact with little damping ring: after landing, and where it
         // followed the torque that the motion leaves.
         let rise = self.pressing_rate_per_s * input.tick_s;
-        let approach = rise / (1.0 + rise);
-        state.pressing = share.at_most(state.pressing + approach * (share - state.pressing));
+        state.pressing = share.at_most((state.pressing + rise * share) / (1.0 + rise));
         state.fed_force_n = wanted * state.pressing;
         LawOutput {
             torque_nm: motion_nm + pressing_nm * state.pressing,

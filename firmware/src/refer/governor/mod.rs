@@ -169,18 +169,12 @@ impl EdgeGovernor {
         let outside = |position: f32| position > upper || position < lower;
         let speed = wanted.velocity_m_s;
         let stop_m = wanted.position_m + 0.5 * speed * speed.abs() / braking_m_s2;
-        // A reference that moves or is about to is at most a step of its own away.
-        let (step_m, ahead_m) = (speed * tick_s, wanted.position_m - self.position_m);
-        let on_its_way_m = ahead_m.limited(step_m.at_most(0.0), step_m.at_least(0.0));
-        let away_m = (ahead_m - on_its_way_m).abs();
         self.at_edge = outside(wanted.position_m);
-        self.follows = !outside(stop_m)
-            && !self.at_edge
-            && (if self.follows {
-                away_m < JUMP_M
-            } else {
-                away_m < CAUGHT_M
-            });
+        // A reference that moves or is about to is on its way of one tick, or this far from it.
+        let half_way_m = 0.5 * speed * tick_s;
+        let away_m = (wanted.position_m - self.position_m - half_way_m).abs() - half_way_m.abs();
+        let near_m = if self.follows { JUMP_M } else { CAUGHT_M };
+        self.follows = !self.at_edge && !outside(stop_m) && away_m < near_m;
         if self.follows {
             self.position_m = wanted.position_m;
             self.velocity_m_s = speed;
