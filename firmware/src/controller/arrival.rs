@@ -69,7 +69,12 @@ fn irregular(
         estimates.can_read_encoders(frame),
         estimates.can_read_forces(frame),
     );
-    let mut note = |lapse: Lapse, times: u32| supervisor.note(lapse, times);
+    let mut first = None;
+    let mut note = |lapse: Lapse, times: u32| {
+        if supervisor.lapses.note(lapse, times) && first.is_none() {
+            first = Some(lapse);
+        }
+    };
     for (input, lapse) in BOARD_LAPSES {
         note(lapse, u32::from(frame.inputs.contains(input)));
     }
@@ -91,6 +96,9 @@ fn irregular(
             Arrival::OutOfRange
         }
     };
+    if let Some(lapse) = first {
+        supervisor.latch(lapse.fault());
+    }
     // A sender that has started anew counts from another number: follow it once its frames have latched a fault, so that
     // it can reset the fault.
     if !stale || supervisor.fault().is_some() {
