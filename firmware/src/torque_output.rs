@@ -109,4 +109,23 @@ mod tests {
         limit(&mut command, &JointTorque::new(4.0, -1.0)).unwrap();
         assert!(!command.saturated);
     }
+
+    #[test]
+    fn what_the_limit_withholds_is_not_owed_and_the_other_joint_keeps_its_remainder() {
+        let scale = LinearScale {
+            bits: 12,
+            range: 5.0,
+        };
+        let output = TorqueOutput::new(scale, 2.0);
+        let rest_nm = 0.3 * output.converter.per_count;
+        let wanted = LawOutput {
+            torque_nm: JointTorque::new(-7.0, rest_nm),
+            ..Default::default()
+        };
+        let mut command = LastCommand::default();
+        output.tick(&mut command, &wanted).unwrap();
+        assert!(command.saturated);
+        assert!((command.torque_nm.first() + 2.0).abs() <= 0.5 * output.converter.per_count);
+        assert_eq!(command.rounding_nm.to_array(), [0.0, rest_nm]);
+    }
 }

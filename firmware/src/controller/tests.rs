@@ -3,7 +3,7 @@
 use super::*;
 use crate::configuration::ControllerSettings;
 use crate::estimate::contact::Evidence;
-use crate::refer::reference::Program;
+use crate::refer::reference::{Program, Segment};
 use crate::supervise::lapses::{Lapse, LapseLimits};
 use crate::test_readings::pressing as frame;
 use painleve_shared::counts::{EncoderCounts, ForceCounts};
@@ -286,6 +286,36 @@ fn the_tip_is_pressed_less_where_torque_is_short() {
     assert_eq!(telemetry.saturated_ticks, 0);
     let largest_nm = telemetry.torque_nm.amax();
     assert!(largest_nm <= 0.95 * 1.5 + 1e-3, "{largest_nm}");
+}
+
+#[test]
+fn the_reference_waits_where_a_thrown_tip_has_left_it() {
+    let mut configuration = configuration();
+    let step = Segment::Step {
+        target_m: 0.1,
+        duration_s: 10.0,
+    };
+    configuration.settings.reference.segments = [step].into_iter().collect();
+    let mut controller = Controller::new(&configuration).unwrap();
+    // The tip is 0.26 m away, and the governor catches up.
+    run(&mut controller, 0..100);
+    let mut telemetry = Telemetry::default();
+    let references_m = (100..200).filter_map(|tick| {
+        let in_the_air = SensorFrame {
+            normal_force: ForceCounts(0),
+            tangential_force: ForceCounts(0),
+            ..frame(tick)
+        };
+        controller.tick_with_telemetry(&in_the_air, &mut telemetry);
+        telemetry.recovering.then_some(telemetry.reference_m)
+    });
+    let references_m: std::vec::Vec<f32> = references_m.collect();
+    assert!(references_m.len() > 50, "{references_m:?}");
+    assert!(
+        references_m
+            .iter()
+            .all(|it| *it == references_m[0] && *it < 0.0)
+    );
 }
 
 #[test]
