@@ -23,6 +23,12 @@ impl TorqueOutput {
         Self { converter, limit }
     }
 
+    /// Returns the counts that are given where these are wanted.
+    #[inline]
+    pub fn limited(&self, counts: i32) -> i32 {
+        counts.max(-self.limit).min(self.limit)
+    }
+
     /// Converts a law's answer at one tick to a command: limits the desired torques and rounds them to counts.
     ///
     /// # Errors
@@ -38,7 +44,7 @@ impl TorqueOutput {
         // count of constant torque would cause one newton of force.
         let owed = wanted_nm + command.rounding_nm;
         let nearest = owed.to_array().map(|torque| self.converter.nearest(torque));
-        let counts = nearest.map(|counts| counts.max(-self.limit).min(self.limit));
+        let counts = nearest.map(|counts| self.limited(counts));
         let given = counts.map(|counts| self.converter.value(counts));
         command.counts = counts.map(TorqueCounts);
         command.torque_nm = JointTorque::from_array(given);

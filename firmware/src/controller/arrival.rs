@@ -69,6 +69,7 @@ fn irregular(
         estimates.can_read_encoders(frame),
         estimates.can_read_forces(frame),
     );
+    // One latch after all of them: a call for each would add to the bound on a tick.
     let mut first = None;
     let mut note = |lapse: Lapse, times: u32| {
         if supervisor.lapses.note(lapse, times) && first.is_none() {

@@ -10,6 +10,7 @@ use painleve_shared::status::{Fault, SupervisorState};
 use crate::configuration::Configuration;
 use crate::law::Law;
 use crate::supervise::lapses::{BOARD_LAPSES, Lapse, LapseMonitor};
+use crate::torque_output::TorqueOutput;
 
 /// Time after which a torque that is not repeated expires, s.
 const LIFETIME_S: f32 = 0.05;
@@ -22,8 +23,7 @@ const FARTHEST: u32 = 32;
 pub struct OpenLoop {
     /// Scale of both encoders, whose zeros do not matter here.
     encoder: EncoderScale,
-    /// Largest torque, counts.
-    limit: i32,
+    output: TorqueOutput,
     /// Ticks after which a torque expires.
     lifetime: u32,
     torques: [TorqueCounts; 2],
@@ -42,7 +42,7 @@ impl OpenLoop {
         let [encoder, _] = converters.encoders;
         Self {
             encoder,
-            limit: converters.torque.counts(settings.torque_limit_nm).0,
+            output: TorqueOutput::new(converters.torque, settings.torque_limit_nm),
             // However slow the ticks are, a torque acts until the next one.
             lifetime: ((LIFETIME_S * configuration.tick_hz) as u32).max(1),
             torques: [TorqueCounts(0); 2],
@@ -56,8 +56,7 @@ impl OpenLoop {
     /// Requests torques from now on; without effect while the drive is not armed.
     pub fn request(&mut self, torques: [TorqueCounts; 2]) {
         if self.armed_at.is_some() {
-            let limited = |it: TorqueCounts| TorqueCounts(it.0.min(self.limit).max(-self.limit));
-            self.torques = torques.map(limited);
+            self.torques = torques.map(|it| TorqueCounts(self.output.limited(it.0)));
             self.age = 0;
         }
     }
