@@ -79,7 +79,7 @@ impl Telemetry {
             tangential_force_n: contact.force_n.x,
             torque_nm: command.torque_nm,
             contact: contact.touches,
-            contact_confidence: estimates.decision.confidence(),
+            contact_confidence: estimates.detector.confidence(),
             friction: contact.friction.coefficient,
             friction_deviation: contact.friction.deviation(),
             slip: contact.friction.slip,

@@ -58,7 +58,7 @@ impl<L: Law> Stages<L> {
             ..settings.estimator
         };
         let (tick_hz, tick_s) = (configuration.tick_hz, configuration.tick_s());
-        let (torque_limit_nm, [link_length_m, _]) = (settings.torque_limit_nm, arm.link_length_m());
+        let torque_limit_nm = settings.torque_limit_nm;
         let force_cell = converters.force.converter();
         let estimates = Estimators {
             contact: ContactEstimate {
@@ -68,19 +68,14 @@ impl<L: Law> Stages<L> {
             model: Model::default(),
             arm,
             joints: JointEstimator::new(&joints, converters.encoders, tick_hz),
-            decision: ContactDetector::new(&settings.contact),
-            friction: FrictionEstimator::new(&settings.friction, &settings.contact, tick_s),
+            detector: ContactDetector::new(&settings.contact),
+            friction_filter: FrictionEstimator::new(&settings.friction, &settings.contact, tick_s),
             belt: BeltEstimator::new(&settings.belt, tick_s),
             response: ResponseEstimator::new(&settings.response, tick_s),
             disturbance: DisturbanceEstimator::new(&settings.disturbance, torque_limit_nm, tick_s),
-            calibrator: LengthCalibrator::new(
-                &settings.calibration,
-                link_length_m,
-                Turn::COUNT * tick_s,
-            ),
+            calibrator: LengthCalibrator::new(&settings.calibration, &arm, Turn::COUNT * tick_s),
             joint_friction: JointFriction::new(configuration.arm.coulomb_friction_nm),
             force_cell,
-            force_range_n: force_cell.value(force_cell.maximum_counts),
         };
         Self {
             estimates,

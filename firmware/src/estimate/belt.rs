@@ -47,14 +47,19 @@ impl BeltEstimator {
         }
     }
 
-    /// Updates the bounds with one tick: the tip's velocity (m/s) and, in contact, the friction
-    /// estimate.
+    /// Updates the bounds `elapsed_ticks` after the last readings, with the tip's velocity (m/s) and, in contact, the
+    /// friction estimate.
     #[inline]
-    pub fn update(&mut self, tip_velocity_m_s: f32, friction: Option<&FrictionEstimate>) {
+    pub fn update(
+        &mut self,
+        tip_velocity_m_s: f32,
+        friction: Option<&FrictionEstimate>,
+        elapsed_ticks: u32,
+    ) {
         if self.is_given {
             return;
         }
-        let widening = self.widening_m_s;
+        let widening = self.widening_m_s * elapsed_ticks as f32;
         self.slowest_m_s -= widening;
         self.fastest_m_s += widening;
         let Some(friction) = friction.filter(|friction| friction.slip_seen) else {
@@ -107,8 +112,8 @@ mod tests {
     #[test]
     fn sliding_both_ways_closes_the_bounds() {
         let mut belt = BeltEstimator::new(&BeltSpeedSettings::default(), 1e-3);
-        belt.update(0.1, Some(&friction(Slip::Positive, false)));
-        belt.update(-0.3, Some(&friction(Slip::Negative, false)));
+        belt.update(0.1, Some(&friction(Slip::Positive, false)), 1);
+        belt.update(-0.3, Some(&friction(Slip::Negative, false)), 1);
         let (slowest, fastest) = belt.bounds_m_s();
         assert!((slowest + 0.3).abs() < 1e-6 && (fastest - 0.102).abs() < 1e-3);
     }
@@ -117,12 +122,12 @@ mod tests {
     fn a_tip_as_fast_as_one_that_slid_lately_does_not_stick() {
         let mut belt = BeltEstimator::new(&BeltSpeedSettings::default(), 1e-3);
         assert!(belt.may_stick(0.0));
-        belt.update(0.1, Some(&friction(Slip::Negative, false)));
+        belt.update(0.1, Some(&friction(Slip::Negative, false)), 1);
         assert!(!belt.may_stick(0.05) && belt.may_stick(0.095));
         assert!(belt.may_stick(0.4));
         // The belt may have slowed down meanwhile.
         for _ in 0..50 {
-            belt.update(0.0, None);
+            belt.update(0.0, None, 1);
         }
         assert!(belt.may_stick(0.05));
     }
@@ -130,11 +135,13 @@ mod tests {
     #[test]
     fn stick_gives_the_speed_and_the_bounds_widen_with_time() {
         let mut belt = BeltEstimator::new(&BeltSpeedSettings::default(), 1e-3);
-        belt.update(-0.25, Some(&friction(Slip::Positive, true)));
+        belt.update(-0.25, Some(&friction(Slip::Positive, true)), 1);
         assert_eq!(belt.bounds_m_s(), (-0.25, -0.25));
-        for _ in 0..100 {
-            belt.update(0.0, None);
+        for _ in 0..50 {
+            belt.update(0.0, None, 1);
         }
+        // Lost frames take time as well.
+        belt.update(0.0, None, 50);
         let (slowest, fastest) = belt.bounds_m_s();
         assert!((slowest + 0.45).abs() < 1e-3 && (fastest + 0.05).abs() < 1e-3);
     }
@@ -144,16 +151,16 @@ mod tests {
         let mut belt = BeltEstimator::new(&BeltSpeedSettings::default(), 1e-3);
         assert_eq!(belt.slip_at_rest(), None);
         // Slip in one direction bounds the belt's speed on one side.
-        belt.update(0.3, Some(&friction(Slip::Positive, false)));
+        belt.update(0.3, Some(&friction(Slip::Positive, false)), 1);
         assert_eq!(belt.slip_at_rest(), None);
-        belt.update(-0.15, Some(&friction(Slip::Positive, false)));
+        belt.update(-0.15, Some(&friction(Slip::Positive, false)), 1);
         assert_eq!(belt.slip_at_rest(), Some(Slip::Positive));
         // A tip that is thrown faster than the belt does not change that.
-        belt.update(-0.2, Some(&friction(Slip::Negative, false)));
+        belt.update(-0.2, Some(&friction(Slip::Negative, false)), 1);
         assert_eq!(belt.slip_at_rest(), Some(Slip::Positive));
         // In time the belt may have turned.
         for _ in 0..100 {
-            belt.update(0.0, None);
+            belt.update(0.0, None, 1);
         }
         assert_eq!(belt.slip_at_rest(), None);
         let forwards = BeltSpeedSettings {
@@ -167,8 +174,8 @@ mod tests {
     #[test]
     fn a_belt_faster_than_its_bounds_moves_them() {
         let mut belt = BeltEstimator::new(&BeltSpeedSettings::default(), 1e-3);
-        belt.update(-0.5, Some(&friction(Slip::Positive, false)));
-        belt.update(0.5, Some(&friction(Slip::Negative, false)));
+        belt.update(-0.5, Some(&friction(Slip::Positive, false)), 1);
+        belt.update(0.5, Some(&friction(Slip::Negative, false)), 1);
         assert_eq!(belt.bounds_m_s(), (0.5, 0.5));
     }
 
@@ -181,7 +188,7 @@ mod tests {
             },
             1.0,
         );
-        belt.update(3.0, Some(&friction(Slip::Negative, false)));
+        belt.update(3.0, Some(&friction(Slip::Negative, false)), 1);
         assert_eq!(belt.bounds_m_s(), (-0.4, -0.4));
     }
 }

@@ -23,7 +23,9 @@ settings! {
 /// Calibrates the links' length from the gaps measured while the tip is on the belt.
 #[derive(Clone, Copy, Debug)]
 pub struct LengthCalibrator {
-    nominal_m: f32,
+    /// The arm with its nominal lengths, from which every length is scaled: the roundings of one scaling after another
+    /// would add up.
+    nominal: Arm<f32>,
     /// Largest deviation from the nominal length, m.
     deviation_m: f32,
     /// Number of readings beyond which old ones are forgotten.
@@ -35,10 +37,11 @@ pub struct LengthCalibrator {
 }
 
 impl LengthCalibrator {
-    /// Makes a calibrator of arms whose link 1 has the nominal length `nominal_m`, updated every `period_s`.
-    pub fn new(settings: &CalibrationSettings, nominal_m: f32, period_s: f32) -> Self {
+    /// Makes a calibrator of the `nominal` arm, updated every `period_s`.
+    pub fn new(settings: &CalibrationSettings, nominal: &Arm<f32>, period_s: f32) -> Self {
+        let [nominal_m, _] = nominal.link_length_m();
         Self {
-            nominal_m,
+            nominal: *nominal,
             deviation_m: settings.tolerance * nominal_m,
             most_readings: (AVERAGING_S / period_s).at_least(1.0),
             mean: 0.0,
@@ -60,7 +63,19 @@ impl LengthCalibrator {
     /// tip is on the belt, and scales the arm to the length that follows.
     #[inline]
     pub fn update(&mut self, arm: &mut Arm<f32>, measured_gap_m: f32) {
-        arm.scale_to(self.length_m(arm, measured_gap_m));
+        if self.deviation_m == 0.0 {
+            return;
+        }
+        let ([present_m, _], [nominal_m, _]) = (arm.link_length_m(), self.nominal.link_length_m());
+        let height_m = arm.height_m();
+        let sum = (height_m - measured_gap_m) / present_m;
+        self.readings = (self.readings + 1.0).at_most(self.most_readings);
+        self.mean += (sum - self.mean) / self.readings;
+        let length_m = height_m / self.mean;
+        // Rejects non-finite lengths as well.
+        if (length_m - nominal_m).abs() <= self.deviation_m {
+            *arm = self.nominal.scaled_to(length_m);
+        }
     }
 
     /// Restarts the mean at this measured gap (m): the tip is assumed on the belt, because it cannot be below
@@ -75,24 +90,6 @@ impl LengthCalibrator {
     /// Returns whether the length is calibrated but has no reading yet.
     pub fn is_open(&self) -> bool {
         self.deviation_m > 0.0 && self.readings == 0.0
-    }
-
-    /// Returns the length of link 1 after one more reading, m.
-    fn length_m(&mut self, arm: &Arm<f32>, measured_gap_m: f32) -> f32 {
-        let ([present_m, _], height_m) = (arm.link_length_m(), arm.height_m());
-        if self.deviation_m == 0.0 {
-            return present_m;
-        }
-        let sum = (height_m - measured_gap_m) / present_m;
-        self.readings = (self.readings + 1.0).at_most(self.most_readings);
-        self.mean += (sum - self.mean) / self.readings;
-        let length_m = height_m / self.mean;
-        // Rejects non-finite lengths as well.
-        if (length_m - self.nominal_m).abs() <= self.deviation_m {
-            length_m
-        } else {
-            present_m
-        }
     }
 }
 
@@ -122,9 +119,10 @@ mod tests {
             height_m: HEIGHT_M,
             ..ArmParameters::default()
         };
+        let arm = Arm::new(parameters).unwrap();
         Calibration {
-            calibrator: LengthCalibrator::new(&CalibrationSettings::default(), 0.21, 1e-3),
-            arm: Arm::new(parameters).unwrap(),
+            calibrator: LengthCalibrator::new(&CalibrationSettings::default(), &arm, 1e-3),
+            arm,
         }
     }
 
@@ -152,6 +150,19 @@ mod tests {
             length_m = calibration.update(gap_m(0.205, length_m) + error_m);
         }
         assert!((length_m - 0.205).abs() < 1e-6, "{length_m}");
+    }
+
+    #[test]
+    fn an_hour_of_readings_leaves_the_arm_as_one_scaling_does() {
+        let mut calibration = calibration();
+        let nominal = calibration.arm;
+        for tick in 0..1_800_000 {
+            let used_m = calibration.arm.link_length_m()[0];
+            let error_m = if tick % 2 == 0 { 50e-6 } else { -50e-6 };
+            calibration.update(gap_m(0.215, used_m) + error_m);
+        }
+        let [length_m, _] = calibration.arm.link_length_m();
+        assert_eq!(calibration.arm, nominal.scaled_to(length_m));
     }
 
     #[test]

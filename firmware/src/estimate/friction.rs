@@ -103,8 +103,6 @@ pub struct FrictionEstimator {
     /// Largest variance of μ, at the start and whenever the filter restarts, and its growth in one tick.
     first_variance: f32,
     drift_variance: f32,
-    /// Square of a tangential force beyond the noise, N².
-    clear_force_n2: f32,
     /// Weight of one innovation in their average.
     mean_weight: f32,
     /// Ticks in a row that indicate a slip in the opposite direction.
@@ -143,8 +141,6 @@ impl FrictionEstimator {
             force_variance_n2,
             first_variance,
             drift_variance: square(DRIFT_PER_SQRT_S) * tick_s,
-            // Three standard deviations.
-            clear_force_n2: 9.0 * force_variance_n2,
             mean_weight: tick_s / (MEAN_S + tick_s),
             contrary_ticks: 0,
             slip_in_doubt: true,
@@ -240,8 +236,8 @@ impl FrictionEstimator {
     #[inline(never)]
     fn observe_slip(&mut self, estimate: &mut FrictionEstimate, force_n: &Vector2<f32>) {
         let slip = Slip::of(-force_n.x);
-        // Below the noise level the sign carries no information.
-        let clear = force_n.x * force_n.x > self.clear_force_n2;
+        // Below the noise level, three standard deviations, the sign carries no information.
+        let clear = force_n.x * force_n.x > 9.0 * self.force_variance_n2;
         let cone_n = REVERSAL_FRACTION * estimate.coefficient * force_n.y;
         let contrary = clear && slip != estimate.slip && force_n.x.abs() >= cone_n;
         self.contrary_ticks = if contrary { self.contrary_ticks + 1 } else { 0 };
@@ -255,7 +251,8 @@ impl FrictionEstimator {
 
     /// Forgets how well μ is known: a tip that has left the belt may have been thrown off by more friction than
     /// estimated. It will land at rest, with the slip `at_rest` if that is known.
-    pub fn leave(&self, estimate: &mut FrictionEstimate, at_rest: Option<Slip>) {
+    pub fn leave(&mut self, estimate: &mut FrictionEstimate, at_rest: Option<Slip>) {
+        self.contrary_ticks = 0;
         estimate.variance = self.first_variance;
         estimate.slip = at_rest.unwrap_or(estimate.slip);
     }

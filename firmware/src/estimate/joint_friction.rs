@@ -13,8 +13,6 @@ const COMPENSATED: f32 = 0.85;
 /// Model of both joints' Coulomb friction.
 #[derive(Clone, Copy, Debug)]
 pub struct JointFriction {
-    /// Whether there is nothing to compensate.
-    is_zero: bool,
     /// Compensated Coulomb friction, N·m.
     coulomb_nm: [f32; 2],
     /// Joint angles at the last tick, rad; absent before the first.
@@ -26,10 +24,8 @@ pub struct JointFriction {
 impl JointFriction {
     /// Makes the model for joints with this Coulomb friction, N·m.
     pub fn new(coulomb_friction_nm: [f32; 2]) -> Self {
-        let coulomb_nm = coulomb_friction_nm.map(|nm| COMPENSATED * nm);
         Self {
-            is_zero: coulomb_nm == [0.0; 2],
-            coulomb_nm,
+            coulomb_nm: coulomb_friction_nm.map(|nm| COMPENSATED * nm),
             angles_rad: None,
             torque_nm: JointTorque::zeros(),
         }
@@ -38,7 +34,7 @@ impl JointFriction {
     /// Returns whether there is nothing to compensate.
     #[inline]
     pub fn is_zero(&self) -> bool {
-        self.is_zero
+        self.coulomb_nm == [0.0; 2]
     }
 
     /// Returns the change of the friction in one tick, as a torque on the links, N·m, given the joint angles q', rad.

@@ -66,12 +66,10 @@ pub struct Estimators {
     /// The arm with its calibrated length.
     pub arm: Arm<f32>,
     pub(crate) joints: JointEstimator,
-    pub(crate) decision: ContactDetector,
-    pub(crate) friction: FrictionEstimator,
+    pub(crate) detector: ContactDetector,
+    pub(crate) friction_filter: FrictionEstimator,
     pub(crate) belt: BeltEstimator,
     pub(crate) force_cell: LinearConverter<f32>,
-    /// Largest reading of the force cell, N.
-    pub(crate) force_range_n: f32,
     pub(crate) response: ResponseEstimator,
     pub(crate) disturbance: DisturbanceEstimator,
     pub(crate) calibrator: LengthCalibrator,
@@ -127,19 +125,19 @@ impl Estimators {
             self.force_cell.value(frame.tangential_force.0),
             self.force_cell.value(frame.normal_force.0),
         );
-        let touches = match self.decision.evidence() {
-            Evidence::ForceCell => self.decision.update_from_force(force_n.y),
+        let touches = match self.detector.evidence() {
+            Evidence::ForceCell => self.detector.update_from_force(force_n.y),
             Evidence::Encoders => {
                 let mut encoders = self.encoder_reading(last);
                 self.find_belt(&mut encoders);
-                self.decision.update_from_encoders(&encoders)
+                self.detector.update_from_encoders(&encoders)
             }
         };
         let contact = &mut self.contact;
         let touched = core::mem::replace(&mut contact.touches, touches);
         contact.lands = touches && !touched;
         contact.leaves = touched && !touches;
-        contact.in_flight = self.decision.is_in_flight();
+        contact.in_flight = self.detector.is_in_flight();
         contact.force_n = force_n;
         self.correct_friction(last.reference_velocity_m_s);
         followed
@@ -159,7 +157,7 @@ impl Estimators {
                 falls_behind && self.belt.may_stick(tip_velocity_m_s)
             };
             let contact = &mut self.contact;
-            self.friction
+            self.friction_filter
                 .correct(&mut contact.friction, &contact.force_n, is_dragged);
         }
         let contact = &mut self.contact;
@@ -171,7 +169,8 @@ impl Estimators {
     /// Returns whether the force cell is not at the end of its range, where it reads less than the actual force.
     #[inline]
     fn is_in_range(&self) -> bool {
-        let (force_n, range_n) = (&self.contact.force_n, self.force_range_n);
+        let force_n = &self.contact.force_n;
+        let range_n = self.force_cell.value(self.force_cell.maximum_counts);
         force_n.x.abs() < range_n && force_n.y.abs() < range_n
     }
 
@@ -184,9 +183,13 @@ impl Estimators {
         let (model, contact) = (&self.model, &mut self.contact);
         let friction = &mut contact.friction;
         if is_in_range {
-            self.friction.update(friction, &contact.force_n);
+            self.friction_filter.update(friction, &contact.force_n);
         }
-        self.belt.update(model.tip_velocity_m_s.x, Some(friction));
+        self.belt.update(
+            model.tip_velocity_m_s.x,
+            Some(friction),
+            observed.elapsed_ticks,
+        );
         let p_per_kg = contact.p_per_kg;
         let slides = p_per_kg > 0.0 && !friction.sticks;
         let mut completes_block = false;
@@ -204,7 +207,7 @@ impl Estimators {
                 self.balance_torques();
                 // The gap of a tip that certainly touches shows the links' length. An unchanged reading would gain weight
                 // merely with time.
-                if self.decision.is_certain() && self.joints.moved {
+                if self.detector.is_certain() && self.joints.moved {
                     let gap_m = self.gap_m();
                     self.calibrator.update(&mut self.arm, gap_m);
                 }
@@ -223,10 +226,12 @@ impl Estimators {
     pub fn learn_in_the_air(&mut self, observed: &Observed, turn: Turn) {
         if self.contact.leaves {
             let at_rest = self.belt.slip_at_rest();
-            self.friction.leave(&mut self.contact.friction, at_rest);
+            self.friction_filter
+                .leave(&mut self.contact.friction, at_rest);
         }
         let tip_velocity_m_s = self.model.tip_velocity_m_s.x;
-        self.belt.update(tip_velocity_m_s, None);
+        self.belt
+            .update(tip_velocity_m_s, None, observed.elapsed_ticks);
         self.response.pause();
         self.add_to_balance(observed);
         if turn == Turn::Balance {
@@ -238,7 +243,7 @@ impl Estimators {
     /// not explain.
     #[inline]
     fn add_to_balance(&mut self, observed: &Observed) -> bool {
-        let is_informative = self.decision.is_certain() && self.is_in_range() && observed.drove;
+        let is_informative = self.detector.is_certain() && self.is_in_range() && observed.drove;
         if is_informative {
             let (torque_nm, force_n) = (&observed.torque_nm, &self.contact.force_n);
             self.disturbance

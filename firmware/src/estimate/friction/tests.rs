@@ -114,6 +114,17 @@ fn only_friction_near_the_other_side_of_the_cone_reverses_the_slip() {
 }
 
 #[test]
+fn ticks_before_a_flight_are_no_part_of_a_row_after_it() {
+    let mut tested = Tested::new(0.6);
+    slide(&mut tested, 0.6, Slip::Positive, 200);
+    tested.is_dragged = true;
+    slide(&mut tested, 0.6, Slip::Negative, 2);
+    tested.estimator.leave(&mut tested.estimate, None);
+    slide(&mut tested, 0.6, Slip::Negative, 1);
+    assert_eq!(tested.estimate.slip, Slip::Positive);
+}
+
+#[test]
 fn less_friction_is_learnt_at_once_unless_the_belt_drags_the_tip() {
     let mut tested = Tested::new(0.6);
     slide(&mut tested, 0.6, Slip::Positive, 2000);
