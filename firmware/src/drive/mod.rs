@@ -16,10 +16,10 @@ use painleve_shared::frame::{ActuatorFrame, SensorFrame};
 ///
 /// # Order of calls
 /// The calls of one tick are, in this order: [`begin_tick`](Self::begin_tick),
-/// [`sample`](Self::sample), [`actuate`](Self::actuate) if there is an answer, [`end_tick`](Self::end_tick),
-/// [`next_tick_is_due`](Self::next_tick_is_due), and `actuate` again if an overrun, or a message
-/// received in between, has latched a fault. [`stopwatch`](Self::stopwatch) may be called at any
-/// time.
+/// [`sample`](Self::sample) if there is a configuration, [`actuate`](Self::actuate) if there is an answer, then,
+/// if it answers a frame, [`end_tick`](Self::end_tick) and [`next_tick_is_due`](Self::next_tick_is_due), and
+/// `actuate` again if an overrun, or a message received in between, has latched a fault. Without a configuration,
+/// `actuate` takes the torque off. [`stopwatch`](Self::stopwatch) may be called at any time.
 ///
 /// # Time
 /// Every call returns in bounded time. All calls of a tick together with the controller's tick take

@@ -20,8 +20,8 @@ pub struct Answered<'a> {
     pub sensor: Option<&'a SensorFrame>,
     /// The frame that takes effect.
     pub frame: &'a ActuatorFrame,
-    /// Duration of the controller's tick, answer and update, in counts of [`Drive::stopwatch`]; 0 without a sensor
-    /// frame.
+    /// Duration of the controller's tick, answer and update, in counts of [`Drive::stopwatch`]; 0 for a fault that was
+    /// latched without one.
     pub elapsed: u32,
 }
 
@@ -190,9 +190,10 @@ impl<D: Drive, L: Law> ControlTask<D, L> {
         };
         self.sensor = self.drive.sample();
         let Some(frame) = &self.sensor else {
-            let missing = u32::from(self.source == FrameSource::Realtime);
+            // In lockstep time stands still until a frame comes.
+            let missing = u32::from(self.source != FrameSource::Lockstep);
             if let Some(stopped) = controller.note(Lapse::MissingFrame, missing) {
-                self.drive.actuate(&stopped);
+                self.drive.actuate(&stop(&mut self.open_loop, stopped));
                 self.elapsed = 0;
                 self.due = Due::Report;
             }
@@ -275,8 +276,8 @@ impl<D: Drive, L: Law> ControlTask<D, L> {
     }
 
     /// Returns how often each kind of lapse has occurred; `None` without a configuration.
-    pub fn lapse_counts(&self) -> Option<&LapseMonitor> {
-        self.controller.as_ref().map(Controller::lapse_counts)
+    pub fn lapses(&self) -> Option<&LapseMonitor> {
+        self.controller.as_ref().map(Controller::lapses)
     }
 
     /// Returns the source of the frames.
