@@ -32,12 +32,12 @@ impl TorqueOutput {
     /// Converts a law's answer at one tick to a command: limits the desired torques and rounds them to counts.
     ///
     /// # Errors
-    /// [`Fault::NotFinite`] if the law's torque is not a finite number; the command stays unchanged.
+    /// [`Fault::NotFinite`] if the law's torque or contact force is not a finite number; the command stays unchanged.
     #[inline]
     pub fn tick(&self, command: &mut LastCommand, output: &LawOutput) -> Result<(), Fault> {
-        let wanted_nm = output.torque_nm;
-        // Check before clamping, which would turn an infinity into a limit. The sum is finite only if both are.
-        if !(wanted_nm.first() + wanted_nm.second()).is_finite() {
+        let (wanted_nm, force_n) = (output.torque_nm, &output.contact_force_n);
+        // Check before clamping, which would turn an infinity into a limit. The sum is finite only if all are.
+        if !(wanted_nm.first() + wanted_nm.second() + force_n.x + force_n.y).is_finite() {
             return Err(Fault::NotFinite);
         }
         // Carry the rounding remainder to the next tick: near the edge, where p is small, half a
@@ -63,6 +63,8 @@ impl TorqueOutput {
 
 #[cfg(test)]
 mod tests {
+    use nalgebra::Vector2;
+
     use super::*;
 
     fn stages() -> TorqueOutput {
@@ -82,14 +84,21 @@ mod tests {
     }
 
     #[test]
-    fn a_torque_that_is_not_a_number_is_refused() {
-        for wanted in [
-            JointTorque::new(f32::NAN, 0.0),
-            JointTorque::new(0.0, f32::INFINITY),
-        ] {
-            let mut command = LastCommand::default();
-            assert_eq!(limit(&mut command, &wanted), Err(Fault::NotFinite));
-            assert_eq!(command, LastCommand::default());
+    fn a_torque_or_force_that_is_not_a_number_is_refused() {
+        for bad in [f32::NAN, f32::INFINITY] {
+            for place in 0..4 {
+                let mut values = [0.0; 4];
+                values[place] = bad;
+                let [first, second, tangential, normal] = values;
+                let output = LawOutput {
+                    torque_nm: JointTorque::new(first, second),
+                    contact_force_n: Vector2::new(tangential, normal),
+                };
+                let mut command = LastCommand::default();
+                let refused = stages().tick(&mut command, &output);
+                assert_eq!(refused, Err(Fault::NotFinite), "{values:?}");
+                assert_eq!(command, LastCommand::default());
+            }
         }
     }
 

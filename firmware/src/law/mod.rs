@@ -74,12 +74,6 @@ pub trait Law: Clone + Debug + Default + SettingValue {
         self.clone()
     }
 
-    /// Returns the state before the law's first tick. A law on a PC may allocate it here, once:
-    /// the ticks must not.
-    fn initial_state(&self) -> Self::State {
-        Self::State::default()
-    }
-
     /// Resets the law's state; called before the law's tick when the drive is armed and when the
     /// tip lands.
     fn reset(&self, state: &mut Self::State, input: &LawInput<'_>) {
@@ -88,7 +82,7 @@ pub trait Law: Clone + Debug + Default + SettingValue {
     }
 
     /// Computes the torques for one tick. Takes bounded time, does not allocate and does not panic;
-    /// a non-finite torque latches a fault.
+    /// a torque or contact force that is not finite latches a fault.
     fn tick(&self, state: &mut Self::State, input: &LawInput<'_>) -> LawOutput;
 }
 

@@ -38,8 +38,8 @@ settings! {
         velocity_gain_per_s: f32 = 128.0, 0.0..=1e4, "1/s";
         /// Gain of ∫ (z_t* − z_t) dt, added to α_v; not in the paper.
         position_integral_gain_per_s3: f32 = 10_000.0, 0.0..=1e9, "1/s³";
-        /// Rate at which the law learns the acceleration of the tip along the belt by contact forces other
-        /// than those fed forward, which it cancels; 0 for never. Not in the paper.
+        /// Rate at which the law learns, and cancels, the tip's acceleration along the belt by contact forces that are not
+        /// fed forward; 0 for never. Not in the paper.
         force_drift_rad_s: f32 = 1500.0, 0.0..=1e4, "rad/s";
         /// Rate at which the normal force rises to f_n*, as a fraction of it: after landing, and after a motion that left
         /// too little torque for it.
