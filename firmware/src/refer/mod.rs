@@ -132,7 +132,7 @@ impl References {
                 && self
                     .governor
                     .has_edges_for(self.posture, self.asked_p_ratio),
-            at_edge: drives && self.governor.is_at_edge(),
+            at_edge: drives && !recovering && self.governor.is_at_edge(),
             recovering,
         }
     }

@@ -7,7 +7,7 @@
 //! a bound and holds it at the edge.
 //!
 //! The search for the edges goes outwards from the tip, one point at a time. The time of a tick is
-//! therefore bounded, and the edges follow the friction estimate within a tenth of a second at 1 kHz.
+//! therefore bounded, and the edges follow the friction estimate within about a tenth of a second at 1 kHz.
 
 mod search;
 mod settings;
@@ -150,7 +150,8 @@ impl EdgeGovernor {
             ControlFlow::Break(edge_m) => edge_m,
         };
         if direction > 0.0 {
-            self.edges_m.1 = edge_m;
+            // Until the lower one is found, the edges stay in order.
+            self.edges_m = (self.edges_m.0.at_most(edge_m), edge_m);
         } else {
             // A stretch shorter than both margins shrinks to a point.
             self.edges_m.0 = edge_m.at_most(self.edges_m.1);
@@ -163,6 +164,7 @@ impl EdgeGovernor {
     pub fn govern(&mut self, wanted: &TipReference) -> TipReference {
         let (tick_s, braking_m_s2) = (self.tick_s, self.settings.braking_m_s2);
         if !self.settings.enabled {
+            self.position_m = wanted.position_m;
             return *wanted;
         }
         let (lower, upper) = self.edges_m;

@@ -35,7 +35,7 @@ pub(super) struct Search {
     /// +1 for the upper edge, −1 for the lower one.
     pub(super) direction: f32,
     /// Last point on the tip's side of the edge, m.
-    pub(super) inside_m: f32,
+    inside_m: f32,
     stage: Stage,
 }
 
@@ -110,9 +110,6 @@ impl Search {
                 };
                 (self.inside_m, halving)
             }
-            Stage::Halving { times, .. } if times >= HALVINGS => {
-                return ControlFlow::Break(self.inside_m);
-            }
             Stage::Halving { beyond_m, times } => {
                 let (inside_m, beyond_m) = if is_inside {
                     (point_m, beyond_m)
@@ -120,6 +117,9 @@ impl Search {
                     (self.inside_m, point_m)
                 };
                 let times = times + 1;
+                if times >= HALVINGS {
+                    return ControlFlow::Break(inside_m);
+                }
                 (inside_m, Stage::Halving { beyond_m, times })
             }
         };

@@ -10,8 +10,8 @@ settings! {
         enabled: bool = true;
         /// Least p/Q22.
         p_ratio: f32 = 0.08, 0.0..=0.9;
-        /// Least p. A belt that accelerates by a changes the normal force by a/p, which must not take it all: p falls
-        /// towards the straight arm, whatever p/Q22 is.
+        /// Least p. A belt surface that accelerates by a towards or away from the arm changes the normal force by a/p, and
+        /// must not use all of it up; p falls as the arm straightens, whatever p/Q22 is.
         p_per_kg: f32 = 0.0, 0.0..=1e3, "1/kg";
         /// Number of standard deviations by which friction and the tip's place are taken to be worse than estimated.
         deviations: f32 = 2.0, 0.0..=10.0;

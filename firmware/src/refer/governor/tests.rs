@@ -297,4 +297,20 @@ fn a_governor_that_is_off_passes_any_reference_on() {
     let beyond = TipReference::at_rest(0.2);
     assert_eq!(governor.govern(&beyond), beyond);
     assert!(!governor.is_at_edge());
+    // There the reference of a thrown tip waits.
+    assert_eq!(governor.present(), beyond);
+}
+
+#[test]
+fn edges_stay_in_order_where_the_tip_has_crossed_one() {
+    let friction = known(0.8, Slip::Positive);
+    let governor = searched(-0.1, Posture::ElbowDown, &friction);
+    let mut crossed = governor;
+    crossed.edges_m = (0.25, 0.3);
+    for _ in 0..300 {
+        crossed.search(&arm(), Posture::ElbowDown, -0.1, &friction, 0.0);
+        let (lower_m, upper_m) = crossed.edges_m();
+        assert!(lower_m <= upper_m, "{lower_m} {upper_m}");
+    }
+    assert_eq!(crossed.edges_m(), governor.edges_m());
 }
