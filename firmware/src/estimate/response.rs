@@ -108,8 +108,8 @@ pub struct ResponseEstimator {
     /// Averages of the blocks.
     averages: [Moments; 2],
     blocks: f32,
-    /// Weight of the last block.
-    block_weight: f32,
+    /// Sum of the squares of the blocks' weights in the averages.
+    spread: f32,
     /// Bounds of ρ from first differences.
     lower: f32,
     upper: f32,
@@ -119,7 +119,7 @@ pub struct ResponseEstimator {
     give: f32,
     /// How certainly it is not rigid, from the upper bound of second differences.
     lags: f32,
-    /// Time since the tip touched, s.
+    /// Time in contact without a pause, s.
     touched_s: f32,
 }
 
@@ -156,14 +156,14 @@ impl Moments {
         self.measured += weight * (sums.measured - self.measured);
     }
 
-    /// Returns ρ and its standard deviation, from averages whose last block had this weight.
+    /// Returns ρ and its standard deviation, from averages of blocks whose squared weights have this sum.
     #[inline(never)]
-    fn response(&self, weight: f32) -> (f32, f32) {
+    fn response(&self, spread: f32) -> (f32, f32) {
         let largest = |most: f32, product: &f32| product.at_least(most);
         let most = self.products.iter().fold(0.0, largest);
         // Not zero where nothing was expected: the response is then unknown.
         let square = self.expected.at_least(1e-12);
-        let variance = weight / (2.0 - weight) * self.measured * square;
+        let variance = spread * self.measured * square;
         let deviation = (variance / f32::from(BLOCK_TICKS)).square_root() / square;
         (most / square, deviation)
     }
@@ -190,7 +190,7 @@ impl ResponseEstimator {
             block_ticks: 0,
             averages: Default::default(),
             blocks: 0.0,
-            block_weight: 1.0,
+            spread: 1.0,
             lower: 0.0,
             upper: 1.0,
             gain: if settings.enabled { 0.0 } else { 1.0 },
@@ -279,7 +279,8 @@ impl ResponseEstimator {
         self.blocks += 1.0;
         // The plain mean of the first blocks, until it covers the averaging time.
         let weight = (1.0 / self.blocks).at_least(self.weight).at_most(1.0);
-        self.block_weight = weight;
+        let rest = 1.0 - weight;
+        self.spread = rest * rest * self.spread + weight * weight;
         for (averages, sums) in self.averages.iter_mut().zip(&sums) {
             averages.approach(sums, weight);
         }
@@ -289,14 +290,13 @@ impl ResponseEstimator {
     #[inline(never)]
     fn bound(&mut self) {
         self.block_ticks = 0;
-        let weight = self.block_weight;
         let [first, second] = &self.averages;
-        let (response, deviation) = first.response(weight);
+        let (response, deviation) = first.response(self.spread);
         self.lower = response - DEVIATIONS * deviation;
         self.upper = response + DEVIATIONS * deviation;
         self.gain = self.lower / RIGID;
         self.give = (1.0 - self.upper / (DAMPED * RIGID)).at_least(0.0);
-        let (response, deviation) = second.response(weight);
+        let (response, deviation) = second.response(self.spread);
         let upper = response + DEVIATIONS * deviation;
         self.lags = (2.0 - 2.0 * upper / RIGID).limited(0.0, 1.0);
     }
