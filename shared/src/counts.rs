@@ -65,9 +65,8 @@ impl ForceCounts {
 impl Micrometres {
     /// Rounds to a whole number of µm; saturates, and NaN gives 0.
     #[inline]
-    pub fn from_metres<T: Real>(metres: T) -> Self {
-        // Exact for `f32` and `f64` callers alike: both round the same product.
-        Self(round_to_i32(metres * T::literal(1e6)))
+    pub fn from_metres(metres: f32) -> Self {
+        Self(round_to_i32(metres * 1e6))
     }
 
     /// Returns this position in m.

@@ -2,12 +2,9 @@
 
 use postcard_schema::Schema;
 use serde::{Deserialize, Serialize};
-use strum::{EnumIter, FromRepr};
 
 /// Whether a board has a configuration of its own, and why not.
-#[derive(
-    Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema, EnumIter, FromRepr,
-)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, Schema)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[repr(u8)]
 pub enum StoredState {

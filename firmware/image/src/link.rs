@@ -174,7 +174,7 @@ pub fn link<D, L, P, F>(
                 Ok(Request::Probe(probe)) => {
                     let drives = control.lock(|control| {
                         let task = &control.task;
-                        task.lapse_counts().is_some() && task.source().drives()
+                        task.lapses().is_some() && task.source().drives()
                     });
                     let probed = if drives {
                         None
@@ -194,7 +194,7 @@ pub fn link<D, L, P, F>(
                 Ok(Request::Sources) => Response::Sources(SOURCES),
                 Ok(Request::PermitArming(permitted)) => {
                     Response::Permission(control.lock(|control| {
-                        let is_configured = control.task.lapse_counts().is_some();
+                        let is_configured = control.task.lapses().is_some();
                         let drive = control.task.drive_mut();
                         drive.permit_arming(permitted && is_configured)
                     }))

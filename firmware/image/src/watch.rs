@@ -46,7 +46,7 @@ pub fn health<D: Drive, L: Law>(task: &ControlTask<D, L>, dropped_responses: u32
         ticks: task.counts().ticks,
         dropped_responses,
         lapses: task
-            .lapse_counts()
+            .lapses()
             .map_or_else(LapseCounts::default, LapseMonitor::totals),
     }
 }

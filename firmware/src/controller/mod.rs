@@ -177,7 +177,7 @@ impl<L: Law> Controller<L> {
     }
 
     /// Returns how often each kind of lapse has occurred.
-    pub fn lapse_counts(&self) -> &LapseMonitor {
+    pub fn lapses(&self) -> &LapseMonitor {
         &self.stages.supervisor.lapses
     }
 

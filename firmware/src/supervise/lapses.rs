@@ -16,7 +16,7 @@ pub const BOARD_LAPSES: [(DigitalInputs, Lapse); 4] = [
 ];
 
 /// Good ticks that make up for one lapse. With two, a kind that fails at more than a third of the ticks is a fault in
-/// the end, whatever its limit; with one, a kind that fails at every other tick never would be.
+/// the end, whatever its limit, and one of lost frames at more than a quarter, because no tick answers them; with one, a kind that fails at every other tick never would be.
 const GOOD_PER_LAPSE: i32 = 2;
 
 /// Lapses of one kind.

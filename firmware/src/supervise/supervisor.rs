@@ -27,8 +27,8 @@ settings! {
     pub struct SupervisorSettings {
         /// Time in contact before the reference starts.
         arming_s: f32 = 0.01, 0.0..=1e4, "s";
-        /// Time without contact after which arming ends with the fault `ContactNotFound`; at least
-        /// `arming_s`.
+        /// Time from arming after which a tip that has not been in contact for `arming_s` latches the fault
+        /// `ContactNotFound`; at least `arming_s`.
         arming_limit_s: f32 = 1.0, 0.0..=1e4, "s";
         /// Reaction to a loss of contact while tracking.
         on_lift_off: OnLiftOff = OnLiftOff::Recover;

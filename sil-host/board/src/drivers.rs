@@ -160,14 +160,14 @@ impl ConnectedBoard for Drivers {
     fn health(&mut self) -> Result<Health, BoardError> {
         Ok(Health {
             ticks: self.ticks,
-            lapses: self.controller.lapse_counts().totals(),
+            lapses: self.controller.lapses().totals(),
             ..Health::default()
         })
     }
 
     fn remark(&self) -> Option<String> {
         let flipped = self.bit_errors();
-        let lapses = self.controller.lapse_counts();
+        let lapses = self.controller.lapses();
         let lost = lapses.total(Lapse::EncoderOutOfRange) + lapses.total(Lapse::ForceOutOfRange);
         (flipped > 0).then(|| {
             format!(

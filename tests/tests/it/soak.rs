@@ -145,7 +145,7 @@ impl Far for Native {
     }
 
     fn counts(&mut self) -> (u32, LapseCounts) {
-        let lapses = self.task.lapse_counts().expect("it is configured").totals();
+        let lapses = self.task.lapses().expect("it is configured").totals();
         (self.task.counts().ticks, lapses)
     }
 }
