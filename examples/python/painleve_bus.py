@@ -100,7 +100,8 @@ class Bus:
         if begin.kind != BEGIN:
             raise ConnectionError("the plant has left")
         self.tick_hz = begin.tick_hz
-        (run / "answering").write_text(controller)
+        (run / "answering.new").write_text(controller)
+        (run / "answering.new").rename(run / "answering")
 
     @staticmethod
     def _ready_run(folder):

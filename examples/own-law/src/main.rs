@@ -6,4 +6,4 @@ fn main() -> std::process::ExitCode {
 }
 
 #[cfg(target_os = "none")]
-compile_error!("build the image with --bin own-law-qemu");
+compile_error!("build the image with --bin own-law-f405");

@@ -29,7 +29,7 @@ pub enum AcceptError {
     Board(#[from] BoardError),
     /// The acceptance would erase a configuration.
     #[error(
-        "the board holds a stored configuration, which the acceptance would erase: remove it with `painleve drive --forget` first"
+        "the board holds a stored configuration, which the acceptance would erase: remove it with `painleve drive --port PORT --forget` first"
     )]
     Stored,
 }
@@ -95,7 +95,7 @@ fn empty<P: Port>(bench: &mut Bench<P>) -> Option<Check> {
         Ok(found) => format!("{:?}, version {}", found.state, found.version),
         Err(error) => error.to_string(),
     };
-    let expected = "Empty: erase it with `painleve drive --forget`";
+    let expected = "Empty: erase it with `painleve drive --port PORT --forget`";
     Some(Check::new(
         "stored configuration at the end",
         left,

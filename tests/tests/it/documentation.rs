@@ -93,7 +93,7 @@ fn the_commands_of_the_tutorials_succeed() {
         executed += 1;
     }
     assert!(executed >= 11, "only {executed} commands found");
-    for file in ["out/run.html", "out/own-arm.html", "out/commissioned.toml"] {
+    for file in ["out/run.html", "out/my-arm.html", "out/commissioned.toml"] {
         assert!(bench.path(file).exists(), "{file}");
     }
     let merged = fs::read_to_string(bench.path("out/sweep/merged.csv")).unwrap();

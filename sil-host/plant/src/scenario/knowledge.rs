@@ -9,26 +9,26 @@ settings! {
     pub struct Knowledge {
         /// Where values and deviations come from.
         source: String = "exactly known".into();
-        /// Zero of each encoder. It is strongly correlated with the encoder's error once around.
+        /// Standard deviation of each encoder's zero. It is strongly correlated with the encoder's error once around.
         encoder_zero_rad: [f64; 2] = [0.0; 2], 0.0..=1.0, "rad";
-        /// Error of each encoder once around in a turn: the larger of sine and cosine.
+        /// Standard deviation of each encoder's error once around in a turn: the larger of sine and cosine.
         encoder_once_rad: [f64; 2] = [0.0; 2], 0.0..=1.0, "rad";
-        /// The same twice around.
+        /// Standard deviation of the same twice around.
         encoder_twice_rad: [f64; 2] = [0.0; 2], 0.0..=1.0, "rad";
-        /// Length of each link.
+        /// Standard deviation of each link's length.
         link_length_m: [f64; 2] = [0.0; 2], 0.0..=10.0, "m";
-        /// Height of the first joint over the belt.
+        /// Standard deviation of the height of joint 1 over the belt.
         height_m: f64 = 0.0, 0.0..=20.0, "m";
-        /// Position of the tip along the belt, if link 1 has its length.
+        /// Standard deviation of the tip's position along the belt, if link 1 has its stated length.
         tip_m: f64 = 0.0, 0.0..=1.0, "m";
         /// Distance of the tip from a straight line in the slides, root mean square.
         off_line_m: f64 = 0.0, 0.0..=1.0, "m";
         /// Acceleration of the tip off the belt by waves, vibration and torques that the controller does not know, root mean
         /// square in the slides. `controller.governor.p_per_kg` follows from it.
         ripple_m_s2: f64 = 0.0, 0.0..=1e6, "m/s²";
-        /// Coulomb friction of each joint.
+        /// Standard deviation of each joint's Coulomb friction.
         coulomb_friction_nm: [f64; 2] = [0.0; 2], 0.0..=1e4, "N·m";
-        /// Stiffness of the spring in each joint.
+        /// Standard deviation of the stiffness of the spring in each joint.
         stiffness_nm_rad: [f64; 2] = [0.0; 2], 0.0..=1e6, "N·m/rad";
     }
 }
