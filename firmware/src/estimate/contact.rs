@@ -3,7 +3,8 @@
 //!
 //! - **Force cell**: a reading f with noise σ is weighed between a contact of at least f_c and no
 //!   contact: (f_c/σ²) (f − f_c/2). The decision does not chatter on a noisy reading near zero, and
-//!   a clear reading changes it within two or three ticks.
+//!   a clear reading changes it within two or three ticks. A tip in the air lands at f_c, so that a cell
+//!   whose zero is wrong by half of f_c does not show a contact there.
 //! - **Encoders**: the height of the tip above the belt is measured to half a count of each
 //!   encoder, h = ½ (|z_t| Δθ₁ + l₂ |sin θ₂| Δθ₂₁). A gap larger than h shows flight. In addition,
 //!   when the contact force vanishes, the joints accelerate against the prediction of the tracking
@@ -101,14 +102,15 @@ impl ContactDetector {
     /// the tip touches.
     #[inline]
     pub fn update_from_force(&mut self, normal_force_n: f32) -> bool {
-        let above = normal_force_n - 0.5 * self.settings.contact_n;
+        let share = if self.contact { 0.5 } else { 1.0 };
+        let above = normal_force_n - share * self.settings.contact_n;
         self.weigh((self.slope_per_n * above).within(CERTAIN))
     }
 
     /// Updates the decision with one tick's encoder readings. Returns whether the tip touches.
     pub fn update_from_encoders(&mut self, encoders: &EncoderReading) -> bool {
-        let gap = (GAP_SLOPE * (1.0 - encoders.gap_m.abs() / encoders.gap_error_m))
-            .limited(-CERTAIN, GAP_FOR);
+        let gap =
+            (GAP_SLOPE * (1.0 - encoders.gap_m / encoders.gap_error_m)).limited(-CERTAIN, GAP_FOR);
         let release = ((0.5 * encoders.full_release - encoders.release) / INNOVATION_VARIANCE)
             .limited(-CERTAIN, 0.0);
         let change = gap + release;
@@ -185,6 +187,17 @@ mod tests {
         assert_eq!(detector.confidence(), 1.0);
         assert!(ticks_until(false, || detector.update_from_force(0.0)) <= 3);
         assert!(!detector.update_from_force(0.1));
+    }
+
+    #[test]
+    fn a_force_cell_with_a_wrong_zero_shows_no_contact_in_the_air() {
+        let mut detector = detector();
+        for tick in 0..1000 {
+            let noise_n = [0.1, -0.1, 0.05, -0.05][tick % 4];
+            assert!(!detector.update_from_force(0.2 + noise_n));
+        }
+        // A tip that lands presses more.
+        assert_eq!(ticks_until(true, || detector.update_from_force(1.0)), 2);
     }
 
     #[test]

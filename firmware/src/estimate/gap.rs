@@ -38,12 +38,8 @@ impl Estimators {
     /// With contact from the encoders, the belt is assumed at the lowest tip position so far: initially
     /// the start position, then every lower one.
     pub(super) fn find_belt(&mut self, encoders: &mut EncoderReading) {
-        let starts = self.calibrator.is_open();
-        if starts || encoders.is_below_belt() {
-            let gap_m = encoders.gap_m;
-            self.calibrator.restart(&mut self.arm, gap_m);
-        }
-        if starts {
+        if self.calibrator.is_open() || encoders.is_below_belt() {
+            self.calibrator.restart(&mut self.arm, encoders.gap_m);
             encoders.gap_m = 0.0;
         }
     }
