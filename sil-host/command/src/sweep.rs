@@ -284,6 +284,7 @@ fn compute_shard(
     let records = arguments
         .threads
         .compute(&name, &share, Shown::with_json(arguments.json))?;
+    Manifest::check_files(folder, &understood.files)?;
     shard_file::write(folder, manifest, shard, share.rows(), &records)?;
     Ok(finished(true))
 }

@@ -2,6 +2,7 @@
 //!
 //! Every file opened here is remembered, so that no output of the same process replaces it.
 
+use std::cell::RefCell;
 use std::collections::BTreeMap;
 use std::fs::{File, Metadata, OpenOptions};
 use std::io::{self, Read};
@@ -17,6 +18,11 @@ pub const MOST_BYTES: u64 = 16 << 20;
 
 /// Largest size of a controller's image with its debug information, bytes. Real ones have ten million.
 pub const MOST_IMAGE_BYTES: u64 = 256 << 20;
+
+thread_local! {
+    /// The contents that this thread has read in [`with_contents`], by path; `None` outside.
+    static CONTENTS: RefCell<Option<BTreeMap<PathBuf, Vec<u8>>>> = const { RefCell::new(None) };
+}
 
 /// The files opened so far, by device and inode.
 static OPENED: Mutex<BTreeMap<(u64, u64), PathBuf>> = Mutex::new(BTreeMap::new());
@@ -67,6 +73,14 @@ pub fn opened_as(file: &Metadata) -> Option<PathBuf> {
     opened.get(&(file.dev(), file.ino())).cloned()
 }
 
+/// Returns what `act` returns, and the content of every file that it reads on this thread: all that its result
+/// depends on besides its arguments.
+pub fn with_contents<T>(act: impl FnOnce() -> T) -> (T, BTreeMap<PathBuf, Vec<u8>>) {
+    let outer = CONTENTS.replace(Some(BTreeMap::new()));
+    let done = act();
+    (done, CONTENTS.replace(outer).unwrap_or_default())
+}
+
 /// Reads a regular file of at most `most_bytes`.
 ///
 /// # Errors
@@ -77,6 +91,11 @@ pub fn bytes(path: &Path, most_bytes: u64) -> io::Result<Vec<u8>> {
     if bytes.len() as u64 > most_bytes {
         return Err(refused(format!("it holds more than {most_bytes} bytes")));
     }
+    CONTENTS.with_borrow_mut(|contents| {
+        if let Some(contents) = contents {
+            contents.insert(path.to_path_buf(), bytes.clone());
+        }
+    });
     Ok(bytes)
 }
 
@@ -98,6 +117,17 @@ mod tests {
     use super::*;
     use nix::sys::stat::Mode;
     use nix::unistd::mkfifo;
+
+    #[test]
+    fn what_is_read_is_known_with_its_content() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("friction.csv");
+        std::fs::write(&path, "position_m,friction").unwrap();
+        read(&path).unwrap();
+        let (text, contents) = with_contents(|| read(&path).unwrap());
+        assert_eq!(contents, BTreeMap::from([(path, text.into_bytes())]));
+        assert_eq!(with_contents(|| ()).1, BTreeMap::new());
+    }
 
     #[test]
     fn regular_files_are_read_and_others_are_refused_without_blocking() {

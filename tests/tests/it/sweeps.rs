@@ -314,6 +314,37 @@ fn mistakes_are_reported_and_nothing_is_written() {
     text(&bench.run(&["sweep", "run", "--shard", "0/3"]));
 }
 
+/// Whichever of the campaign's options leads to it.
+#[test]
+fn a_table_changed_since_planning_is_detected() {
+    let effect = "friction = {kind = 'file', path = 'friction.csv'}";
+    let set = format!("set = [\"effects.{effect}\", 'contact.kind=compliant']\n");
+    for (name, campaign) in [
+        (
+            "sweep-set",
+            format!("study = 'robustness'\nruns = 2\n{set}"),
+        ),
+        ("sweep-table", format!("{CAMPAIGN}scenario = 'mine.toml'\n")),
+    ] {
+        let bench = Bench::new(name);
+        let scenario = format!("[contact]\nkind = 'compliant'\n[effects]\n{effect}\n");
+        write(&bench, "mine.toml", &scenario);
+        write(&bench, "friction.csv", "time_s,change\n0,0.1\n1,0.2\n");
+        write(&bench, "campaign.toml", &campaign);
+        text(&bench.run(&["sweep", "plan", "campaign.toml", "--shards", "2"]));
+        text(&bench.run(&["sweep", "run", "--shard", "0/2"]));
+        write(&bench, "friction.csv", "time_s,change\n0,0.1\n1,0.3\n");
+        let output = bench.run(&["sweep", "run", "--shard", "1/2"]);
+        assert_eq!(code(output.status), 2, "{output:?}");
+        let message = errors(&output);
+        assert!(message.contains("friction.csv"), "{message}");
+        assert!(
+            message.contains("has been changed since the sweep was planned"),
+            "{message}"
+        );
+    }
+}
+
 #[test]
 fn a_scenario_changed_since_planning_is_detected() {
     let campaign = format!("{CAMPAIGN}scenario = 'mine.toml'\n");

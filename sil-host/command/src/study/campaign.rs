@@ -3,15 +3,24 @@
 use std::collections::BTreeMap;
 
 use clap::{ArgAction, Command};
-use painleve_plant::scenario::Scenario;
+use painleve_files::input_file;
 use painleve_study::STUDIES;
+use painleve_study_core::tabular::Table;
 use painleve_study_sweep::campaign::{Campaign, CampaignError, Understood};
 
-/// Returns the study of a campaign.
+/// Returns the study of a campaign, and the files that it is made of.
 ///
 /// # Errors
 /// [`CampaignError`] with the allowed values.
 pub fn understand(campaign: &Campaign) -> Result<Understood, CampaignError> {
+    let (table, files) = input_file::with_contents(|| table(campaign));
+    Ok(Understood {
+        table: table?,
+        files,
+    })
+}
+
+fn table(campaign: &Campaign) -> Result<Box<dyn Table>, CampaignError> {
     let name = campaign.study.as_str();
     let not_shardable = || {
         let all = STUDIES.iter().filter(|entry| entry.has_shards);
@@ -27,16 +36,7 @@ pub fn understand(campaign: &Campaign) -> Result<Understood, CampaignError> {
     let arguments = arguments(campaign, command.clone())?;
     let matches = command.try_get_matches_from(arguments);
     let options = matches.and_then(|matches| (entry.read)(&matches))?;
-    let table = options.table()?.ok_or_else(not_shardable)?;
-    let text = |name: String| {
-        let scenario = Scenario::load_unplaced(&name, &[])?;
-        Ok((name, scenario.to_toml()?))
-    };
-    let scenarios = options.scenarios().into_iter().map(text);
-    Ok(Understood {
-        table,
-        scenarios: scenarios.collect::<Result<_, CampaignError>>()?,
-    })
+    options.table()?.ok_or_else(not_shardable)
 }
 
 /// Returns the campaign's options as a command line.
@@ -107,6 +107,47 @@ mod tests {
             let understood = understand(&campaign(study, &[])).unwrap();
             assert_eq!(understood.table.len(), rows, "{study}");
             assert!(!understood.table.seeds().unwrap().is_empty());
+        }
+    }
+
+    #[test]
+    fn every_file_that_the_rows_depend_on_is_known() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = |name: &str, text: &str| {
+            let path = folder.path().join(name);
+            std::fs::write(&path, text).unwrap();
+            path
+        };
+        let table = file("friction.csv", "time_s,change\n0,0.1\n1,0.2\n");
+        let change = format!(
+            "effects.friction={{ kind = 'file', path = '{}' }}",
+            table.display()
+        );
+        let effect = change.replacen("effects.", "[effects]\n", 1);
+        let scenario = file(
+            "mine.toml",
+            &format!("{effect}\n[contact]\nkind='compliant'\n"),
+        );
+        let scenario = scenario.to_str().unwrap();
+        let controllers = ["hybrid", scenario];
+        let set = ["contact.kind=compliant", &change];
+        for (study, option, values) in [
+            ("robustness", "set", &set[..]),
+            ("capture", "set", &set),
+            ("lift-off", "set", &set),
+            ("sliding-range", "set", &set),
+            ("stiffness", "scenario", &[scenario]),
+            ("bifurcation", "scenario", &[scenario]),
+            ("poincare", "scenario", &[scenario]),
+            ("closed-loop-bifurcation", "controller", &controllers),
+            ("sliding-range", "controller", &controllers),
+            ("loop", "controller", &controllers),
+        ] {
+            let campaign = campaign(study, &[(option, values)]);
+            let Understood { files, .. } = understand(&campaign).unwrap();
+            assert!(files.contains_key(&table), "{study}: {files:?}");
+            let count = if option == "set" { 1 } else { 2 };
+            assert_eq!(files.len(), count, "{study}: {files:?}");
         }
     }
 

@@ -295,17 +295,6 @@ pub fn noise_seeds(
     controllers.iter().map(seed).collect()
 }
 
-/// Returns the scenarios that are not among [`ControllerChoice::ALL`].
-pub fn own_scenarios(controllers: &[ControllerChoice]) -> Vec<&str> {
-    let own = controllers
-        .iter()
-        .filter_map(|controller| match controller {
-            ControllerChoice::Scenario(name) => Some(name.as_str()),
-            _ => None,
-        });
-    own.collect()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -29,11 +29,6 @@ pub trait StudyOptions: Args + Sync + 'static {
     /// Collects all rows of a study into its outcome.
     fn outcome(study: &Self::Study, rows: Vec<<Self::Study as Study>::Row>) -> Self::Outcome;
 
-    /// Returns the names of the scenarios that the study starts from.
-    fn scenarios(&self) -> Vec<String> {
-        Vec::new()
-    }
-
     /// Returns the study's sections of the page of figures; none by default.
     ///
     /// # Errors
@@ -113,9 +108,6 @@ pub trait AnyOptions {
     /// # Errors
     /// [`StudyError`] naming the option or key that is wrong.
     fn table(&self) -> Result<Option<Box<dyn tabular::Table>>, StudyError>;
-
-    /// Returns the names of the scenarios that the study starts from.
-    fn scenarios(&self) -> Vec<String>;
 }
 
 impl<O: StudyOptions> AnyOptions for O {
@@ -127,10 +119,6 @@ impl<O: StudyOptions> AnyOptions for O {
     fn table(&self) -> Result<Option<Box<dyn tabular::Table>>, StudyError> {
         let study = StudyOptions::study(self)?;
         Ok(O::IN_SHARDS.map(|in_shards| in_shards(study)))
-    }
-
-    fn scenarios(&self) -> Vec<String> {
-        StudyOptions::scenarios(self)
     }
 }
 

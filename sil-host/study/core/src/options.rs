@@ -11,7 +11,7 @@ use clap::{Args, ValueEnum};
 use painleve_plant::scenario::Scenario;
 use painleve_shared::Posture;
 
-use crate::case::{self, ControllerChoice, ConverterChoice};
+use crate::case::{ControllerChoice, ConverterChoice};
 use crate::initial::Initials;
 use crate::{Grid, StudyError};
 
@@ -29,11 +29,6 @@ pub struct BaseOptions {
 }
 
 impl BaseOptions {
-    /// Name of the scenario.
-    pub fn name(&self) -> &str {
-        &self.scenario
-    }
-
     /// Returns the scenario with its numbers checked, but not its initial state. `taken` lists
     /// the keys that the study's own options set, with the option of each.
     ///
@@ -176,14 +171,6 @@ pub struct ControllerOptions {
         default_value = "hybrid"
     )]
     pub controller: Vec<ControllerChoice>,
-}
-
-impl ControllerOptions {
-    /// Returns the names of the scenarios and files that controllers are taken from.
-    pub fn scenarios(&self) -> Vec<String> {
-        let own = case::own_scenarios(&self.controller);
-        own.into_iter().map(str::to_owned).collect()
-    }
 }
 
 /// Converters of a closed-loop study.

@@ -28,11 +28,6 @@ pub struct CellOptions {
 }
 
 impl CellOptions {
-    /// Name of the scenario that the cells start from.
-    pub fn scenario(&self) -> &str {
-        self.base.name()
-    }
-
     /// Returns the cells, checked.
     ///
     /// # Errors

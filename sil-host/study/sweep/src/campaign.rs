@@ -8,11 +8,12 @@
 //! ```
 
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use painleve_files::input_file;
-use painleve_plant::scenario::{ScenarioError, TomlError, known_names};
+use painleve_plant::scenario::{TomlError, known_names};
 use painleve_study_core::StudyError;
+use painleve_study_core::tabular;
 use serde::{Deserialize, Serialize};
 use toml::{Table, Value};
 use xxhash_rust::xxh3::xxh3_128;
@@ -64,12 +65,6 @@ pub enum CampaignError {
     /// The study is invalid.
     #[error(transparent)]
     Study(#[from] StudyError),
-    /// A scenario that it starts from is invalid.
-    #[error(transparent)]
-    Scenario(#[from] ScenarioError),
-    /// A scenario cannot be written as text.
-    #[error(transparent)]
-    Text(#[from] toml::ser::Error),
 }
 
 /// Returns clap's message without its hints for the command line.
@@ -89,12 +84,15 @@ pub struct Campaign {
     pub options: BTreeMap<String, Vec<String>>,
 }
 
+/// Files with their contents.
+pub type Files = BTreeMap<PathBuf, Vec<u8>>;
+
 /// A campaign as parsed by its study.
 pub struct Understood {
     /// The study.
-    pub table: Box<dyn painleve_study_core::tabular::Table>,
-    /// The complete text of every scenario that it starts from, by name.
-    pub scenarios: BTreeMap<String, String>,
+    pub table: Box<dyn tabular::Table>,
+    /// The content of every file that it reads: scenarios, and the tables that these or its options name.
+    pub files: Files,
 }
 
 impl Campaign {
@@ -135,9 +133,14 @@ impl Campaign {
     }
 
     /// Returns the hash of everything that the rows depend on besides the program.
-    pub fn hash(&self, scenarios: &BTreeMap<String, String>) -> String {
+    pub fn hash(&self, files: &Files) -> String {
+        let content = |(path, content): (&PathBuf, &Vec<u8>)| {
+            let hash = format!("{:032x}", xxh3_128(content));
+            (path.display().to_string(), hash)
+        };
+        let files: BTreeMap<String, String> = files.iter().map(content).collect();
         // Unlike plain concatenation, JSON keeps adjacent texts separate.
-        let text = serde_json::json!([self.study, self.options, scenarios]).to_string();
+        let text = serde_json::json!([self.study, self.options, files]).to_string();
         format!("{:032x}", xxh3_128(text.as_bytes()))
     }
 }
@@ -173,8 +176,9 @@ mod tests {
         assert_eq!(one.options["mu"], ["0.4", "0.6"]);
         let none = BTreeMap::new();
         assert_eq!(one.hash(&none), other.hash(&none));
-        let scenarios = BTreeMap::from([("mine.toml".to_owned(), "text".to_owned())]);
-        assert_ne!(one.hash(&none), one.hash(&scenarios));
+        let file = |content: &str| BTreeMap::from([("mine.toml".into(), content.into())]);
+        assert_ne!(one.hash(&none), one.hash(&file("text")));
+        assert_ne!(one.hash(&file("texts")), one.hash(&file("text")));
         let mut seed = one.clone();
         seed.options.insert("seed".into(), vec!["8".into()]);
         assert_ne!(one.hash(&none), seed.hash(&none));

@@ -4,14 +4,14 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use painleve_files::atomic_file::{self, AtomicFileError};
-use painleve_files::input_file;
+use painleve_files::input_file::{self, MOST_BYTES};
 use painleve_plant::scenario::TomlError;
 use painleve_study_core::{MOST_ROWS, StudyError};
 use serde::{Deserialize, Serialize};
 use toml::Table;
 use xxhash_rust::xxh3::xxh3_128;
 
-use super::campaign::{Campaign, CampaignError, Understood};
+use super::campaign::{Campaign, CampaignError, Files, Understood};
 use super::share::MOST_SHARDS;
 use super::{ShardError, SweepError};
 
@@ -56,19 +56,21 @@ pub enum ManifestError {
     /// The number of shards does not suit the rows.
     #[error("has been changed: it has more shards than rows, or none")]
     ShardCount,
-    /// The campaign or a scenario has been changed.
-    #[error(
-        "it or a scenario that it starts from ({}) has been changed since the sweep was planned; \
-         plan it again elsewhere",
-        scenarios.join(", ")
-    )]
-    Changed {
-        /// The scenarios.
-        scenarios: Vec<String>,
-    },
+    /// The campaign or a file has been changed.
+    #[error("it {}has been changed since the sweep was planned; plan it again elsewhere", or_files(.0))]
+    Changed(Vec<PathBuf>),
     /// The campaign is invalid.
     #[error(transparent)]
     Campaign(#[from] CampaignError),
+}
+
+/// Names the files that a campaign reads, as an alternative to its manifest; empty without any.
+fn or_files(files: &[PathBuf]) -> String {
+    let names: Vec<String> = files.iter().map(|it| it.display().to_string()).collect();
+    match names.as_slice() {
+        [] => String::new(),
+        names => format!("or a file that it reads ({}) ", names.join(", ")),
+    }
 }
 
 /// Everything that the rows of a sweep depend on.
@@ -81,7 +83,7 @@ pub struct Manifest {
     version: String,
     /// Git revision of the program.
     git_revision: String,
-    /// Hash of the campaign and its scenarios.
+    /// Hash of the campaign and the files that it reads.
     campaign_hash: String,
     /// Number of rows.
     pub rows: usize,
@@ -120,7 +122,7 @@ impl Manifest {
             format: FORMAT,
             version: VERSION.into(),
             git_revision: REVISION.into(),
-            campaign_hash: campaign.hash(&understood.scenarios),
+            campaign_hash: campaign.hash(&understood.files),
             rows,
             shards,
             seeds: understood.table.seeds()?,
@@ -134,7 +136,7 @@ impl Manifest {
         format!("{:032x}", xxh3_128(text.as_bytes()))
     }
 
-    /// Returns the hash of the campaign and its scenarios.
+    /// Returns the hash of the campaign and the files that it reads.
     pub fn campaign_hash(&self) -> &str {
         &self.campaign_hash
     }
@@ -205,22 +207,38 @@ impl Manifest {
         Ok(manifest)
     }
 
-    /// Checks that the campaign, parsed again, is still the planned one.
+    /// Checks that the campaign, parsed again, is still the planned one, with the same files.
     ///
     /// # Errors
     /// [`SweepError::Manifest`] if it has changed.
     pub fn check(&self, folder: &Path, understood: &Understood) -> Result<(), SweepError> {
-        if self.campaign.hash(&understood.scenarios) == self.campaign_hash
+        if self.campaign.hash(&understood.files) == self.campaign_hash
             && understood.table.len() == self.rows
         {
             return Ok(());
         }
-        Err(SweepError::Manifest {
+        Err(Self::changed(folder, &understood.files))
+    }
+
+    /// Checks that no file has changed while rows were computed, which may read one again.
+    ///
+    /// # Errors
+    /// [`SweepError::Manifest`] if one has.
+    pub fn check_files(folder: &Path, files: &Files) -> Result<(), SweepError> {
+        let is_same = |(path, content): (&PathBuf, &Vec<u8>)| {
+            input_file::bytes(path, MOST_BYTES).is_ok_and(|now| now == *content)
+        };
+        match files.iter().all(is_same) {
+            true => Ok(()),
+            false => Err(Self::changed(folder, files)),
+        }
+    }
+
+    fn changed(folder: &Path, files: &Files) -> SweepError {
+        SweepError::Manifest {
             path: Self::path(folder),
-            source: ManifestError::Changed {
-                scenarios: understood.scenarios.keys().cloned().collect(),
-            },
-        })
+            source: ManifestError::Changed(files.keys().cloned().collect()),
+        }
     }
 }
 
@@ -245,6 +263,18 @@ pub(crate) mod tests {
                 options: BTreeMap::from([("mu".into(), vec!["0.6".into()])]),
             },
         }
+    }
+
+    #[test]
+    fn a_file_that_changes_while_rows_are_computed_is_named() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("friction.csv");
+        let files = Files::from([(path.clone(), b"0,1".to_vec())]);
+        std::fs::write(&path, "0,1").unwrap();
+        Manifest::check_files(folder.path(), &files).unwrap();
+        std::fs::write(&path, "0,2").unwrap();
+        let error = Manifest::check_files(folder.path(), &files).unwrap_err();
+        assert!(error.to_string().contains("friction.csv"), "{error}");
     }
 
     proptest! {

@@ -30,10 +30,6 @@ impl StudyOptions for Options {
         Ok(Bifurcation { cells })
     }
 
-    fn scenarios(&self) -> Vec<String> {
-        vec![self.cells.scenario().to_owned()]
-    }
-
     fn outcome(study: &Bifurcation, rows: Vec<Row>) -> BifurcationDiagram {
         BifurcationDiagram::new(study, rows)
     }

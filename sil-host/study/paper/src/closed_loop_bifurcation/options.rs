@@ -76,10 +76,6 @@ impl StudyOptions for Options {
         Ok(study)
     }
 
-    fn scenarios(&self) -> Vec<String> {
-        self.controllers.scenarios()
-    }
-
     fn outcome(_: &ClosedLoopBifurcation, rows: Vec<Row>) -> ClosedLoopDiagram {
         ClosedLoopDiagram::new(rows)
     }

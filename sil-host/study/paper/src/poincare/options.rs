@@ -32,10 +32,6 @@ impl StudyOptions for Options {
         Ok(Poincare { cells })
     }
 
-    fn scenarios(&self) -> Vec<String> {
-        vec![self.cells.scenario().to_owned()]
-    }
-
     fn outcome(study: &Poincare, rows: Vec<Row>) -> PoincareDiagram {
         PoincareDiagram::new(study, rows)
     }

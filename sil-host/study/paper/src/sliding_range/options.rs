@@ -115,10 +115,6 @@ impl StudyOptions for Options {
         Ok(study)
     }
 
-    fn scenarios(&self) -> Vec<String> {
-        self.controllers.scenarios()
-    }
-
     fn outcome(_: &SlidingRange, rows: Vec<Row>) -> SlidingRanges {
         SlidingRanges { rows }
     }

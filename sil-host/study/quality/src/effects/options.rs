@@ -87,8 +87,4 @@ impl StudyOptions for Options {
     fn outcome(study: &EffectsStudy, rows: Vec<Row>) -> EffectsOutcome {
         EffectsOutcome::new(study, rows)
     }
-
-    fn scenarios(&self) -> Vec<String> {
-        self.controllers.scenarios()
-    }
 }

@@ -59,10 +59,6 @@ impl StudyOptions for Options {
         Ok(study)
     }
 
-    fn scenarios(&self) -> Vec<String> {
-        self.controllers.scenarios()
-    }
-
     fn outcome(_: &LoopMargins, rows: Vec<Row>) -> LoopOutcome {
         LoopOutcome { rows }
     }

@@ -55,10 +55,6 @@ impl StudyOptions for Options {
         Ok(study)
     }
 
-    fn scenarios(&self) -> Vec<String> {
-        vec![self.base.name().to_owned()]
-    }
-
     fn outcome(_: &Stiffness, rows: Vec<Row>) -> StiffnessOutcome {
         StiffnessOutcome { rows }
     }
