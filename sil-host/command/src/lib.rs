@@ -467,6 +467,7 @@ fn execute(command: Command) -> Result<(), CommandError> {
         | Command::Commission(_)
         | Command::Identify(_)
         | Command::Drive(_)
+        | Command::Tune(_)
         | Command::Export(_)
         | Command::Timing(_)
         | Command::Doctor(_) => {}
@@ -476,7 +477,6 @@ fn execute(command: Command) -> Result<(), CommandError> {
         | Command::Compare(_)
         | Command::Arm(_)
         | Command::Diff(_)
-        | Command::Tune(_)
         | Command::Scenarios(_)
         | Command::Study(_)
         | Command::Sweep(_)

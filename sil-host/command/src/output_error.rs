@@ -136,10 +136,21 @@ pub enum InputError {
     #[error(transparent)]
     NoEvent(NoEvent),
     /// A table of trials is not of this search.
-    #[error("{} is not a table of this search: choose another --table, or delete it", path.display())]
+    #[error(
+        "{} is not a table of this search: {reason}; choose another --table, or delete it",
+        path.display()
+    )]
     OtherSearch {
         /// The file.
         path: PathBuf,
+        /// What shows it.
+        reason: String,
+    },
+    /// A key of a search is given twice.
+    #[error("--key {key} is given twice: give each key once, with its whole range")]
+    RepeatedKey {
+        /// The key.
+        key: String,
     },
     /// An option is meant for other hosts.
     #[error("{option} has no effect with --host {host}, only with {hosts}: leave it out")]

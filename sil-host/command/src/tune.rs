@@ -1,13 +1,15 @@
 //! `painleve tune`: searches keys of a scenario for a smaller error, ripple and change of torque.
 
+use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use painleve_chart::picture;
-use painleve_files::atomic_file::{self, commit_all, prepare};
+use painleve_files::atomic_file::{self, AtomicFile, commit_all, prepare};
 use painleve_files::input_file;
 use painleve_plant::scenario::Scenario;
+use painleve_process::interrupt::Interrupt;
 use painleve_process::terminal::{self, warn};
 use painleve_study_quality::tuning::{BATCH, Range, Score, Trial, Tuning, svg};
 use serde_json::json;
@@ -55,11 +57,14 @@ pub struct TuneArguments {
 /// [`CommandError`] if the scenario or a key is invalid, the table belongs to another search, or an output cannot be
 /// written.
 pub fn run(arguments: &TuneArguments) -> Result<(), CommandError> {
+    check_keys(&arguments.keys)?;
+    let interrupt = Interrupt::catch()?;
     let tuning = Tuning {
         scenario: Scenario::load(&arguments.scenario, &arguments.overrides)?,
         ranges: arguments.keys.clone(),
         cases: arguments.cases as usize,
         seed: arguments.seed,
+        interrupt: interrupt.clone(),
     };
     tuning.check()?;
     distinct_files::check(&[
@@ -67,12 +72,16 @@ pub fn run(arguments: &TuneArguments) -> Result<(), CommandError> {
         ("--table", &arguments.table),
         ("--plot", &arguments.plot),
     ])?;
+    // Held to the end, so that another search of the same table is refused.
+    let held = AtomicFile::create(&arguments.table).map_err(output)?;
+    held.check_alone().map_err(output)?;
     let given = tuning.score(&tuning.scenario, tuning.cases, tuning.seed)?;
     let all = arguments.trials as usize;
     let mut trials = continued(&arguments.table, &tuning, &given, all)?;
     let progress = progress(all, trials.len());
     while trials.len() < all {
         trials.extend(tuning.next_trials(&trials, all, &given)?);
+        go_on(&interrupt)?;
         progress.set_position(trials.len() as u64);
         atomic_file::write(&arguments.table, &table(&tuning, &trials)?).map_err(output)?;
     }
@@ -87,6 +96,7 @@ pub fn run(arguments: &TuneArguments) -> Result<(), CommandError> {
     let unseen =
         |scenario: &Scenario| tuning.score(scenario, 4 * tuning.cases, tuning.seed.wrapping_add(1));
     let held_out = [unseen(&tuning.scenario)?, unseen(&tuned)?];
+    go_on(&interrupt)?;
     let held_out_cost = held_out[1].cost(&held_out[0]);
     let is_better = held_out_cost < 1.0 && held_out[1].kept >= held_out[0].kept;
     let figure = picture::encoded(&arguments.plot, svg(&trials, &given, best)).map_err(output)?;
@@ -153,6 +163,24 @@ pub fn run(arguments: &TuneArguments) -> Result<(), CommandError> {
     )
 }
 
+/// Refuses a key that is given twice: only the last of its values would count.
+fn check_keys(ranges: &[Range]) -> Result<(), InputError> {
+    for (index, Range { key, .. }) in ranges.iter().enumerate() {
+        if ranges[..index].iter().any(|range| range.key == *key) {
+            return Err(InputError::RepeatedKey { key: key.clone() });
+        }
+    }
+    Ok(())
+}
+
+/// Ends an interrupted search, before it writes what its last cases have scored.
+fn go_on(interrupt: &Interrupt) -> Result<(), CommandError> {
+    match interrupt.is_requested() {
+        true => Err(CommandError::Interrupted),
+        false => Ok(()),
+    }
+}
+
 fn progress(all: usize, done: usize) -> ProgressBar {
     let progress = ProgressBar::with_draw_target(Some(all as u64), ProgressDrawTarget::stderr());
     if let Ok(style) = ProgressStyle::with_template("{wide_bar} {pos}/{len} trials, {eta} left") {
@@ -162,12 +190,18 @@ fn progress(all: usize, done: usize) -> ProgressBar {
     progress
 }
 
+/// Columns of the table after those of the keys.
+const SCORES: [&str; 5] = ["kept", "error_mm", "ripple_n", "torque_change_nm", "cost"];
+
+fn header(tuning: &Tuning) -> impl Iterator<Item = &str> {
+    let keys = tuning.ranges.iter().map(|range| range.key.as_str());
+    keys.chain(SCORES)
+}
+
 /// Returns the table of trials; trial 0 of a table is the given scenario.
 fn table(tuning: &Tuning, trials: &[Trial]) -> Result<Vec<u8>, CommandError> {
     let mut writer = csv::Writer::from_writer(Vec::new());
-    let keys = tuning.ranges.iter().map(|range| range.key.as_str());
-    let scores = ["kept", "error_mm", "ripple_n", "torque_change_nm", "cost"];
-    writer.write_record(keys.chain(scores)).map_err(output)?;
+    writer.write_record(header(tuning)).map_err(output)?;
     for trial in trials {
         let Score {
             kept,
@@ -196,47 +230,26 @@ fn continued(
     if !path.exists() {
         return Ok(Vec::new());
     }
-    let foreign = || InputError::OtherSearch {
+    let foreign = |reason| InputError::OtherSearch {
         path: path.to_path_buf(),
+        reason,
     };
-    let text = input_file::read(path).map_err(|_| foreign())?;
-    let mut reader = csv::Reader::from_reader(text.as_bytes());
-    let keys = tuning.ranges.len();
-    let mut trials = Vec::new();
-    for row in reader.records() {
-        let row = row.map_err(|_| foreign())?;
-        let numbers: Vec<f64> = row
-            .iter()
-            .map(str::parse)
-            .collect::<Result<_, _>>()
-            .map_err(|_| foreign())?;
-        let (values, [kept, error_mm, ripple_n, torque_change_nm, cost]) = numbers
-            .split_at_checked(keys)
-            .and_then(|(values, scores)| Some((values, <[f64; 5]>::try_from(scores).ok()?)))
-            .ok_or_else(foreign)?;
-        trials.push(Trial {
-            values: values.to_vec(),
-            score: Score {
-                kept,
-                error_mm,
-                ripple_n,
-                torque_change_nm,
-            },
-            cost,
-        });
-    }
+    let text = input_file::read(path).map_err(|error| foreign(error.to_string()))?;
+    let mut trials = trials(&text, tuning, given).map_err(foreign)?;
     trials.truncate(all);
     // The last trial is computed again: the same search gives it again, to the last digit.
     let known = trials.len().saturating_sub(1);
     let batch = known - known % BATCH;
     if !trials.is_empty() {
         let again = tuning.next_trials(&trials[..batch], all, given)?;
+        go_on(&tuning.interrupt)?;
         if again
             .iter()
             .zip(&trials[batch..])
             .any(|(one, other)| one != other)
         {
-            return Err(foreign().into());
+            let reason = "with this scenario, --key, --cases and --seed its last trials differ";
+            return Err(foreign(reason.into()).into());
         }
         warn(format_args!(
             "continues {} after {} trials",
@@ -245,4 +258,56 @@ fn continued(
         ));
     }
     Ok(trials)
+}
+
+/// Reads the table of a search.
+///
+/// # Errors
+/// What shows that it is the table of another one, or none.
+fn trials(text: &str, tuning: &Tuning, given: &Score) -> Result<Vec<Trial>, String> {
+    let mut reader = csv::Reader::from_reader(text.as_bytes());
+    let found = reader.headers().map_err(|error| error.to_string())?;
+    if !found.iter().eq(header(tuning)) {
+        let columns: Vec<&str> = header(tuning).collect();
+        return Err(format!("its first line is not '{}'", columns.join(",")));
+    }
+    let mut trials = Vec::new();
+    for (line, row) in (2_usize..).zip(reader.records()) {
+        let row = row.map_err(|error| error.to_string())?;
+        let trial = trial(&row, tuning, given);
+        trials.push(trial.map_err(|reason| format!("line {line}: {reason}"))?);
+    }
+    Ok(trials)
+}
+
+/// Reads a trial, whose cost must be that of its scores.
+fn trial(row: &csv::StringRecord, tuning: &Tuning, given: &Score) -> Result<Trial, String> {
+    let number = |(name, text): (&str, &str), range: RangeInclusive<f64>| {
+        let number = text.parse().ok().filter(|number| range.contains(number));
+        let (from, to) = (range.start(), range.end());
+        number.ok_or_else(|| format!("{name} = {text} is not a number from {from} to {to}"))
+    };
+    let mut cells = header(tuning).zip(row);
+    let keys = tuning.ranges.iter().zip(cells.by_ref());
+    let values = keys.map(|(range, cell)| number(cell, range.from..=range.to));
+    let values = values.collect::<Result<Vec<f64>, _>>()?;
+    let mut score = |most| number(cells.next().unwrap_or_default(), 0.0..=most);
+    let score = Score {
+        kept: score(1.0)?,
+        error_mm: score(f64::INFINITY)?,
+        ripple_n: score(f64::INFINITY)?,
+        torque_change_nm: score(f64::INFINITY)?,
+    };
+    let cost = score.cost(given);
+    let (name, text) = cells.next().unwrap_or_default();
+    if text.parse() == Ok(cost) {
+        return Ok(Trial {
+            values,
+            score,
+            cost,
+        });
+    }
+    Err(format!(
+        "{name} = {text}, but in this search its scores cost {cost:?}"
+    ))
 }

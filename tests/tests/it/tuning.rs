@@ -2,7 +2,10 @@
 
 #![allow(clippy::unwrap_used)]
 
-use painleve_tests::{Bench, code, errors};
+use std::time::Duration;
+
+use nix::sys::signal::Signal;
+use painleve_tests::{Bench, code, errors, signal};
 use serde_json::Value;
 
 const KEYS: [&str; 5] = [
@@ -47,6 +50,10 @@ fn a_search_is_continued_and_its_result_can_be_run() {
         std::fs::read_to_string(bench.path("out/tune.csv")).unwrap(),
         table
     );
+    // More trials continue it, too.
+    tune(&bench, "24");
+    let longer = std::fs::read_to_string(bench.path("out/tune.csv")).unwrap();
+    assert!(longer.starts_with(&table), "{longer}");
 
     let foreign = bench.run(
         &[
@@ -68,4 +75,67 @@ fn a_search_is_continued_and_its_result_can_be_run() {
         "{}",
         errors(&wrong)
     );
+}
+
+#[test]
+fn a_table_of_another_search_is_refused_and_kept() {
+    let bench = Bench::new("tune-foreign");
+    std::fs::write(bench.path("off.toml"), OFF).unwrap();
+    tune(&bench, "8");
+    let path = bench.path("out/tune.csv");
+    let table = std::fs::read_to_string(&path).unwrap();
+    let (header, rows) = table.split_once('\n').unwrap();
+    let (first, rows) = rows.split_once('\n').unwrap();
+    let (scores, _) = first.rsplit_once(',').unwrap();
+    let (value, _) = first.split_once(',').unwrap();
+    for (changed, part) in [
+        (
+            "one line\n".to_owned(),
+            "its first line is not 'controller.",
+        ),
+        (table.replace("velocity", "position"), "its first line"),
+        (
+            format!("{header}\n{scores},-1000.0\n{rows}"),
+            "line 2: cost = -1000.0, but in this search",
+        ),
+        (
+            table.replacen(value, "1.0", 1),
+            "velocity_gain_per_s = 1.0 is not a number from 20 to 300",
+        ),
+        (
+            format!("{header}\n{value},2,1,1,1,1\n{rows}"),
+            "line 2: kept = 2 is not a number from 0 to 1",
+        ),
+    ] {
+        std::fs::write(&path, &changed).unwrap();
+        let output = bench.run(&[&KEYS[..], &["--cases", "1", "--trials", "8"]].concat());
+        assert_eq!(code(output.status), 2, "{output:?}");
+        assert!(errors(&output).contains(part), "{output:?}");
+        assert_eq!(std::fs::read_to_string(&path).unwrap(), changed);
+    }
+    let twice = bench.run(&[&KEYS[..], &KEYS[3..]].concat());
+    assert_eq!(code(twice.status), 2, "{twice:?}");
+    assert!(errors(&twice).contains("is given twice"), "{twice:?}");
+}
+
+#[test]
+fn one_search_at_a_time_has_a_table_and_an_interrupted_one_leaves_it_whole() {
+    let bench = Bench::new("tune-twice");
+    std::fs::write(bench.path("off.toml"), OFF).unwrap();
+    let first = bench.start(&[&KEYS[..], &["--trials", "100000"]].concat());
+    while !bench.path("out/tune.csv").exists() {
+        std::thread::sleep(Duration::from_millis(10));
+    }
+    let second = bench.run(&KEYS);
+    assert_eq!(code(second.status), 4, "{second:?}");
+    let message = errors(&second);
+    assert!(
+        message.contains("is being written by another process"),
+        "{message}"
+    );
+    signal(first.id(), Signal::SIGTERM);
+    let (output, _) = first.end(Duration::from_secs(10));
+    assert_eq!(code(output.status), 130, "{output:?}");
+    assert_eq!(errors(&output), "error: interrupted\n");
+    assert_eq!(bench.files(), ["off.toml", "out/tune.csv"]);
 }

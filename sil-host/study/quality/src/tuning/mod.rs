@@ -2,9 +2,9 @@
 //!
 //! A trial runs the scenario in some cases: with other friction, other masses than the controller's model has, and other
 //! noise. Its cost is the mean of tracking error, force ripple and change of torque, each relative to the given scenario,
-//! and a penalty for cases in which the tip leaves the belt or a fault is latched. The first third of the trials is
-//! spread over the ranges, equally on a logarithmic scale; the others are near the best so far, closer and closer.
-//! A trial depends on the seed and on the earlier trials only: a list of them continues the search.
+//! and a penalty for cases in which the tip leaves the belt or a fault is latched. Every third trial is
+//! anywhere in the ranges, equally on a logarithmic scale; the others are near the best so far, closer and closer.
+//! A trial depends on the seed and on the earlier trials only: a list of them continues the search, to any number.
 
 mod figure;
 mod search;
@@ -16,6 +16,7 @@ use painleve_plant::controller_host::InProcess;
 use painleve_plant::sample::Sample;
 use painleve_plant::scenario::Scenario;
 use painleve_plant::simulation::Simulation;
+use painleve_process::interrupt::Interrupt;
 use painleve_study_core::StudyError;
 use rand::rngs::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
@@ -44,6 +45,8 @@ pub struct Tuning {
     pub cases: usize,
     /// Seed of search and cases.
     pub seed: u64,
+    /// Ends the cases that run; what they score is then worthless.
+    pub interrupt: Interrupt,
 }
 
 /// How well a scenario does in some cases: means over them.
@@ -124,7 +127,7 @@ impl Tuning {
     /// [`StudyError`] if a case cannot be run.
     pub fn score(&self, scenario: &Scenario, cases: usize, seed: u64) -> Result<Score, StudyError> {
         let all: Vec<Case> = (0..cases)
-            .map(|index| run(&case(scenario, seed, index as u64)))
+            .map(|index| run(&case(scenario, seed, index as u64), &self.interrupt))
             .collect::<Result<_, _>>()?;
         let mean = |value: fn(&Case) -> f64| all.iter().map(value).sum::<f64>() / cases as f64;
         Ok(Score {
@@ -151,7 +154,7 @@ impl Tuning {
         (first..last)
             .into_par_iter()
             .map(|index| {
-                let values = search::values(&self.ranges, trials, index, all, self.seed);
+                let values = search::values(&self.ranges, trials, index, self.seed);
                 let score = self.score(&self.with(&values)?, self.cases, self.seed)?;
                 Ok(Trial {
                     values,
@@ -205,13 +208,13 @@ impl Monitor for Errors {
     }
 }
 
-fn run(scenario: &Scenario) -> Result<Case, StudyError> {
+fn run(scenario: &Scenario, interrupt: &Interrupt) -> Result<Case, StudyError> {
     let host = InProcess::new(&scenario.controller_configuration())?;
     let mut closed_loop = ClosedLoop::new(Simulation::new(scenario)?, host);
     let mut errors = Errors::default();
     let mut goes_on = true;
     for _ in 0..scenario.run.ticks() {
-        goes_on = closed_loop.tick(&mut errors).is_ok();
+        goes_on = !interrupt.is_requested() && closed_loop.tick(&mut errors).is_ok();
         if !goes_on {
             break;
         }

@@ -9,13 +9,15 @@ use super::Trial;
 
 /// Trials that are computed at once: each knows only those of earlier batches.
 pub const BATCH: usize = 8;
-/// Part of the trials that is spread over the ranges.
-const SPREAD: f64 = 1.0 / 3.0;
+/// After the first batch, one of so many trials is anywhere in the ranges.
+const ANYWHERE: usize = 3;
 /// Number of the best trials that others are near to.
 const PARENTS: usize = 3;
-/// Distances of the first and the last of these, in widths of the ranges.
+/// Distance of the first of these, and the smallest, in widths of the ranges.
 const FAR: f64 = 0.15;
 const NEAR: f64 = 0.02;
+/// How fast the distance shrinks: it is proportional to the number of trials to the power of this.
+const SHRINKING: f64 = -0.75;
 /// The search has streams of its own, apart from those of the cases.
 const STREAM: u64 = 1 << 32;
 
@@ -73,19 +75,12 @@ impl Range {
     }
 }
 
-/// Returns the values of trial `index` of `all`. Of the earlier `trials` it uses those of complete batches only.
-pub(super) fn values(
-    ranges: &[Range],
-    trials: &[Trial],
-    index: usize,
-    all: usize,
-    seed: u64,
-) -> Vec<f64> {
+/// Returns the values of trial `index`. Of the earlier `trials` it uses those of complete batches only.
+pub(super) fn values(ranges: &[Range], trials: &[Trial], index: usize, seed: u64) -> Vec<f64> {
     let mut generator = ChaCha8Rng::seed_from_u64(seed);
     generator.set_stream(STREAM + index as u64);
-    let spread = (SPREAD * all as f64).ceil() as usize;
     let known = &trials[..(index - index % BATCH).min(trials.len())];
-    if index < spread.max(BATCH) || known.is_empty() {
+    if index.is_multiple_of(ANYWHERE) || known.is_empty() {
         return ranges
             .iter()
             .map(|range| range.at(generator.random_range(0.0..1.0)))
@@ -93,9 +88,8 @@ pub(super) fn values(
     }
     let mut best: Vec<&Trial> = known.iter().collect();
     best.sort_by(|one, other| one.cost.total_cmp(&other.cost));
-    let parent = best[index % PARENTS.min(best.len())];
-    let progress = (index - spread) as f64 / (all - spread).max(1) as f64;
-    let distance = FAR * (NEAR / FAR).powf(progress);
+    let parent = best[index / ANYWHERE % PARENTS.min(best.len())];
+    let distance = (FAR * (index as f64 / BATCH as f64).powf(SHRINKING)).max(NEAR);
     let around = |(range, value): (&Range, &f64)| {
         // The sum of three uniform numbers is nearly normal, with a deviation of 1.
         let step: f64 = (0..3).map(|_| generator.random_range(-1.0..1.0)).sum();
