@@ -162,6 +162,14 @@ pub enum InputError {
         /// The hosts with which it has an effect.
         hosts: String,
     },
+    /// An option lacks what it is about.
+    #[error("{option} has no effect without {needed}: leave it out, or add that")]
+    Needs {
+        /// The option.
+        option: &'static str,
+        /// What it needs.
+        needed: &'static str,
+    },
     /// A record cannot be read.
     #[error("cannot read {}: {source}", path.display())]
     Record {
@@ -189,6 +197,22 @@ pub enum InputError {
 }
 
 impl InputError {
+    /// Refuses options that are given without `needed`. clap's `requires` passes over one that conflicts with
+    /// another given option.
+    ///
+    /// # Errors
+    /// [`InputError::Needs`].
+    pub fn check_needed(
+        needed: &'static str,
+        is_there: bool,
+        options: &[(&'static str, bool)],
+    ) -> Result<(), Self> {
+        match options.iter().find(|(_, is_given)| *is_given) {
+            Some(&(option, _)) if !is_there => Err(Self::Needs { option, needed }),
+            _ => Ok(()),
+        }
+    }
+
     /// A record, or a table of ticks, that cannot be used.
     pub fn record(path: &Path, source: impl Into<RecordFileError>) -> Self {
         Self::Record {

@@ -7,7 +7,7 @@ use clap::{Args, ValueEnum};
 use painleve_board::{emulator, serial};
 use painleve_files::atomic_file::AtomicFile;
 use painleve_files::input_file;
-use painleve_link::{BusName, Pair};
+use painleve_link::{BusName, Pacing, Pair};
 use painleve_plant::scenario::Scenario;
 use painleve_process::interrupt::Interrupt;
 use painleve_process::terminal::warn;
@@ -106,15 +106,15 @@ pub struct RunArguments {
     /// in one process, writes no files, and continues until Ctrl-C.
     #[arg(long, value_name = "PORT", num_args = 0..=1, default_missing_value = "8765")]
     #[arg(conflicts_with_all = ["bus", "port", "fail_on", "record", "plot", "html", "csv"])]
-    #[arg(conflicts_with_all = ["timing", "verbose", "quiet", "json"])]
+    #[arg(conflicts_with_all = ["timing", "verbose", "quiet", "json", "pacing", "silence_limit_s"])]
     live: Option<u16>,
     /// With --live: let every user of this machine watch and steer the run, also without the token in the
     /// printed address.
-    #[arg(long, requires = "live")]
+    #[arg(long)]
     no_token: bool,
     /// With --live: let pages of this origin connect as Foxglove does, for example
     /// http://localhost:8080, or file:// for Foxglove's desktop app; may be repeated.
-    #[arg(long, value_name = "ORIGIN", requires = "live", value_parser = super::origin)]
+    #[arg(long, value_name = "ORIGIN", value_parser = super::origin)]
     live_origin: Vec<String>,
     /// Print errors and warnings only.
     #[arg(short, long, conflicts_with_all = ["json", "verbose"])]
@@ -165,14 +165,29 @@ fn live(
 
 impl RunArguments {
     fn check_options(&self) -> Result<(), InputError> {
-        use Host::{Drivers, Qemu, Serial};
+        use Host::{Drivers, Native, Qemu, Serial};
         let image = &self.image;
+        let of_live = [
+            ("--no-token", self.no_token),
+            ("--live-origin", !self.live_origin.is_empty()),
+        ];
+        InputError::check_needed("--live", self.live.is_some(), &of_live)?;
+        let deadlines = "--fail-on missed-deadline";
+        let fails_on_them = self.fail_on.contains(&FailOn::MissedDeadline);
+        let is_realtime = self.scenario.pacing == Pacing::Realtime;
+        InputError::check_needed(
+            "--pacing realtime",
+            is_realtime,
+            &[(deadlines, fails_on_them)],
+        )?;
         self.host.check_options(&[
             ("--timing", image.timing.is_some(), &[Drivers, Qemu, Serial]),
             ("--elf", image.elf.is_some(), &[Qemu]),
             ("--log", image.log, &[Qemu]),
             ("--port", self.port.is_some(), &[Serial]),
             ("--bit-errors", self.lines.bit_errors != 0.0, &[Drivers]),
+            // The board's timer sets the pace: the plant has no deadlines.
+            (deadlines, fails_on_them, &[Native, Drivers, Qemu]),
         ])
     }
 }

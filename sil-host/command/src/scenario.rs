@@ -11,6 +11,7 @@ use serde::{Deserialize, Serialize};
 use tempfile::NamedTempFile;
 
 use super::CommandError;
+use super::output_error::InputError;
 
 /// A run of the robustness campaign.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
@@ -53,9 +54,9 @@ pub struct ScenarioArguments {
         allow_hyphen_values = true
     )]
     replay: Option<Replay>,
-    /// With --replay: the study's option --arms.
-    #[arg(long, value_enum, default_value = "paper", requires = "replay")]
-    arms: Arms,
+    /// With --replay: the study's option --arms; by default paper.
+    #[arg(long, value_enum)]
+    arms: Option<Arms>,
     /// Override one key, for example belt.friction=0.4; may be repeated.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     overrides: Vec<String>,
@@ -75,9 +76,11 @@ impl ScenarioArguments {
     /// # Errors
     /// [`CommandError`] with one sentence for the user.
     pub fn load(&self) -> Result<Scenario, CommandError> {
+        let arms = [("--arms", self.arms.is_some())];
+        InputError::check_needed("--replay", self.replay.is_some(), &arms)?;
         match self.replay {
             Some(Replay { seed, index }) => {
-                let drawn = robustness::scenario(self.arms, seed, index)?;
+                let drawn = robustness::scenario(self.arms.unwrap_or_default(), seed, index)?;
                 Ok(drawn.with_overrides("replayed run", &self.overrides)?)
             }
             None => Ok(Scenario::load(self.name(), &self.overrides)?),
@@ -89,7 +92,7 @@ impl ScenarioArguments {
         let mut command = String::from("painleve run");
         match self.replay {
             Some(Replay { seed, index }) => {
-                let arms = self.arms.to_possible_value();
+                let arms = self.arms.unwrap_or_default().to_possible_value();
                 let arms = arms.as_ref().map_or("", |arms| arms.get_name());
                 command += &format!(" --replay {seed}:{index} --arms {arms}");
             }

@@ -6,7 +6,7 @@ use painleve_plant::scenario::{Scenario, built_in, describe};
 use painleve_process::terminal;
 use serde_json::{Value, json};
 
-use super::output_error::output;
+use super::output_error::{InputError, output};
 use super::{CommandError, say};
 
 /// Options of `painleve scenarios`.
@@ -21,10 +21,10 @@ pub struct ScenariosArguments {
     #[arg(long, conflicts_with = "schema")]
     json: bool,
     /// Print only the keys whose values are not the defaults.
-    #[arg(long, requires = "scenario", conflicts_with = "json")]
+    #[arg(long, conflicts_with = "json")]
     diff: bool,
     /// Override one key, for example belt.friction=0.4; may be repeated.
-    #[arg(long = "set", value_name = "KEY=VALUE", requires = "scenario")]
+    #[arg(long = "set", value_name = "KEY=VALUE")]
     overrides: Vec<String>,
 }
 
@@ -33,6 +33,11 @@ pub struct ScenariosArguments {
 /// # Errors
 /// [`CommandError`] if the scenario is invalid, or the output cannot be written.
 pub fn run(arguments: &ScenariosArguments) -> Result<(), CommandError> {
+    let of_scenario = [
+        ("--diff", arguments.diff),
+        ("--set", !arguments.overrides.is_empty()),
+    ];
+    InputError::check_needed("SCENARIO", arguments.scenario.is_some(), &of_scenario)?;
     if let Some(name) = &arguments.scenario {
         let scenario = Scenario::load(name, &arguments.overrides)?;
         if arguments.json {

@@ -223,6 +223,45 @@ fn options_without_effect_are_refused() {
         ("run edge --live 0 --verbose", "--verbose"),
         ("run edge --live 0 --csv x.csv", "--csv"),
         ("run edge --live 0 --record x.mcap", "--record"),
+        ("run edge --live 0 --pacing realtime", "--pacing"),
+        ("run edge --live 0 --silence-limit-s 3", "--silence-limit-s"),
+        (
+            "run edge --arms general",
+            "--arms has no effect without --replay",
+        ),
+        ("run --scenario edge --arms general", "--arms"),
+        ("plant edge --bus b --arms general", "--arms"),
+        (
+            "run edge --no-token",
+            "--no-token has no effect without --live",
+        ),
+        ("run edge --no-token --csv x.csv", "--no-token"),
+        ("run edge --no-token --json", "--no-token"),
+        ("run edge --no-token --quiet", "--no-token"),
+        (
+            "run edge --live-origin http://a --record x.mcap",
+            "--live-origin",
+        ),
+        (
+            "run edge --fail-on missed-deadline",
+            "--fail-on missed-deadline has no effect without --pacing realtime",
+        ),
+        (
+            "run edge --fail-on missed-deadline --pacing realtime --host serial --port x",
+            "--fail-on missed-deadline",
+        ),
+        ("commission --port x --mistake belt-too-high", "--mistake"),
+        (
+            "commission --port x --seed 4",
+            "--seed has no effect without --rehearse",
+        ),
+        ("identify --port x --mistake bent-link", "--mistake"),
+        ("identify --slide elbow-up=r.mcap --seed 3", "--seed"),
+        (
+            "scenarios --schema --diff",
+            "--diff has no effect without SCENARIO",
+        ),
+        ("scenarios --schema --set belt.friction=0.4", "--set"),
         ("timing edge --host native --elf x", "--elf"),
         ("drive edge --port x --stored --record x", "--record"),
     ] {

@@ -19,7 +19,7 @@ use self::board_rig::BoardRig;
 pub use self::board_rig::BoardRigError;
 use self::rehearsal::Rehearsal;
 use super::output::warn_of_earlier;
-use super::output_error::output;
+use super::output_error::{InputError, output};
 use super::{CommandError, distinct_files, say};
 
 /// Options of `painleve commission`.
@@ -40,12 +40,12 @@ pub struct CommissionArguments {
     /// Rehearse on a simulated arm, with a simulated operator.
     #[arg(long, conflicts_with = "port")]
     rehearse: bool,
-    /// Mistake of the simulated arm.
-    #[arg(long, value_name = "MISTAKE", value_parser = mistakes(), requires = "rehearse")]
+    /// With --rehearse: mistake of the simulated arm.
+    #[arg(long, value_name = "MISTAKE", value_parser = mistakes())]
     mistake: Option<String>,
-    /// Seed of the simulated operator's hands and of the noise.
-    #[arg(long, default_value_t = 1, value_parser = painleve_study_core::options::seed, requires = "rehearse")]
-    seed: u64,
+    /// With --rehearse: seed of the simulated operator's hands and of the noise; by default 1.
+    #[arg(long, value_parser = painleve_study_core::options::seed)]
+    seed: Option<u64>,
     /// Largest torque on either joint, N·m; by default, a fifth of the torque stages' range.
     #[arg(long, value_name = "N·m")]
     torque_limit_nm: Option<f64>,
@@ -76,6 +76,14 @@ fn mistakes() -> clap::builder::PossibleValuesParser {
 /// # Errors
 /// [`CommandError`] if the arm refuses, the board or a file fails, or the user interrupts.
 pub fn run(arguments: &CommissionArguments) -> Result<(), CommandError> {
+    InputError::check_needed(
+        "--rehearse",
+        arguments.rehearse,
+        &[
+            ("--mistake", arguments.mistake.is_some()),
+            ("--seed", arguments.seed.is_some()),
+        ],
+    )?;
     let mut scenario = Scenario::load(&arguments.scenario, &arguments.overrides)?;
     let tick_hz = scenario.run.tick_hz;
     let as_written = scenario.clone();
@@ -137,7 +145,7 @@ type Outcome = Result<Commissioned, CommissionError<CommandError>>;
 fn rehearse(arguments: &CommissionArguments, scenario: &Scenario, expected: &Expected) -> Outcome {
     let name = arguments.mistake.as_deref();
     let mistake = name.and_then(|name| BuiltInMistake::ALL.iter().find(|it| it.name() == name));
-    let simulated = SimulatedRig::new(scenario, mistake.copied(), arguments.seed);
+    let simulated = SimulatedRig::new(scenario, mistake.copied(), arguments.seed.unwrap_or(1));
     commission(&mut Rehearsal(simulated), expected)
         .map_err(|error| error.map_rig(|error| CommandError::Input(error.into())))
 }

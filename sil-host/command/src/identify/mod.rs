@@ -26,7 +26,7 @@ use self::board_slides::BoardSlides;
 use self::recorded::Recorded;
 use super::drive::check_rate;
 use super::output::warn_of_earlier;
-use super::output_error::output;
+use super::output_error::{InputError, output};
 use super::{CommandError, distinct_files, say};
 
 /// Standard deviation of a length that has been measured with a calliper, m.
@@ -54,12 +54,12 @@ pub struct IdentifyArguments {
     /// A recorded slide: its posture and an MCAP or CSV file, for example elbow-up=slide.mcap; may be repeated.
     #[arg(long, value_name = "POSTURE=PATH", conflicts_with = "port")]
     slide: Vec<Recorded>,
-    /// Mistake of the simulated arm.
-    #[arg(long, value_name = "MISTAKE", value_parser = mistakes(), requires = "rehearse")]
+    /// With --rehearse: mistake of the simulated arm.
+    #[arg(long, value_name = "MISTAKE", value_parser = mistakes())]
     mistake: Option<String>,
-    /// Seed of the simulated arm's errors.
-    #[arg(long, default_value_t = 1, value_parser = painleve_study_core::options::seed, requires = "rehearse")]
-    seed: u64,
+    /// With --rehearse: seed of the simulated arm's errors; by default 1.
+    #[arg(long, value_parser = painleve_study_core::options::seed)]
+    seed: Option<u64>,
     /// Length of link 1 from joint to joint, measured to a tenth of a millimetre, m; by default that of the scenario, to
     /// 0.6 %. A line has no scale: positions are as exact as this length.
     #[arg(long, value_name = "M", value_parser = painleve_study_core::options::metres)]
@@ -85,6 +85,14 @@ fn mistakes() -> clap::builder::PossibleValuesParser {
 /// # Errors
 /// [`CommandError`] if the slides give no result, the board or a file fails, or the user interrupts.
 pub fn run(arguments: &IdentifyArguments) -> Result<(), CommandError> {
+    InputError::check_needed(
+        "--rehearse",
+        arguments.rehearse,
+        &[
+            ("--mistake", arguments.mistake.is_some()),
+            ("--seed", arguments.seed.is_some()),
+        ],
+    )?;
     let mut scenario = Scenario::load(&arguments.scenario, &arguments.overrides)?;
     let recorded: Result<Vec<_>, _> = arguments
         .slide
@@ -139,11 +147,12 @@ fn found(
     }
     let mistake = arguments.mistake.as_deref();
     let mistake = mistake.and_then(|name| GeometryMistake::ALL.iter().find(|it| it.name() == name));
-    let actual = imperfect(scenario, arguments.seed).map_err(|error| range(name, error))?;
+    let seed = arguments.seed.unwrap_or(1);
+    let actual = imperfect(scenario, seed).map_err(|error| range(name, error))?;
     let mut rig = SimulatedSlides::new(actual, mistake.copied());
     let found = identify_arm(&mut rig, scenario, drawn)
         .map_err(|error| failed(name, error, |error| CommandError::Input(error.into())))?;
-    Ok((found, format!("rehearsal with seed {}", arguments.seed)))
+    Ok((found, format!("rehearsal with seed {seed}")))
 }
 
 /// Identifies the arm behind a board; whatever ends it, the torque is off.
