@@ -67,8 +67,9 @@ use painleve_study_core::StudyError;
 use painleve_study_core::options::number;
 use painleve_study_sweep::SweepError;
 
-use commission::BoardRigError;
+use commission::{BoardRigError, CommissionArguments};
 use fail_on::FailedCondition;
+use identify::IdentifyArguments;
 use output_error::{InputError, OutputError, output};
 use plan::Plan;
 use process_error::ProcessError;
@@ -464,14 +465,16 @@ fn execute(command: Command) -> Result<(), CommandError> {
             exit_when_shared_memory_is_full(PEER_FAILED)?;
         }
         Command::Run(_)
-        | Command::Commission(_)
-        | Command::Identify(_)
+        | Command::Commission(CommissionArguments { port: Some(_), .. })
+        | Command::Identify(IdentifyArguments { port: Some(_), .. })
         | Command::Drive(_)
         | Command::Tune(_)
         | Command::Export(_)
         | Command::Timing(_)
         | Command::Doctor(_) => {}
         Command::Accept(_)
+        | Command::Commission(_)
+        | Command::Identify(_)
         | Command::Completions(_)
         | Command::Man(_)
         | Command::Compare(_)

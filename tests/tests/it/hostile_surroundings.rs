@@ -290,6 +290,21 @@ fn interrupted_studies_and_figures_end_with_their_exit_code_and_leave_nothing() 
 }
 
 #[test]
+fn an_interrupted_rehearsal_ends_with_its_exit_code_and_leaves_nothing() {
+    // That of `commission` ends too soon for a signal.
+    for sent in [Signal::SIGTERM, Signal::SIGINT, Signal::SIGHUP] {
+        let bench = Bench::new("rehearsal");
+        let running = bench.start(&["identify", "edge", "--rehearse"]);
+        std::thread::sleep(Duration::from_millis(300));
+        signal(running.id(), sent);
+        let (output, _) = running.end(SOON);
+        assert_eq!(code(output.status), 130, "{sent}: {output:?}");
+        assert_eq!(errors(&output), "error: interrupted\n");
+        assert_eq!(bench.files(), [""; 0]);
+    }
+}
+
+#[test]
 fn an_interrupted_export_leaves_nothing() {
     let bench = Bench::new("export");
     let recorded = bench.run(&["run", "--set", "run.duration_s=60", "--record", "run.mcap"]);

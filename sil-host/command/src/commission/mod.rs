@@ -33,7 +33,7 @@ pub struct CommissionArguments {
     overrides: Vec<String>,
     /// Serial port of the board, for example /dev/ttyUSB0.
     #[arg(long, value_name = "PATH", required_unless_present = "rehearse")]
-    port: Option<PathBuf>,
+    pub port: Option<PathBuf>,
     /// Commission the second sensors of each channel, after the first ones: finds their directions.
     #[arg(long)]
     second_sensors: bool,

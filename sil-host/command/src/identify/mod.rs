@@ -47,7 +47,7 @@ pub struct IdentifyArguments {
     /// Serial port of the board, for example /dev/ttyUSB0.
     #[arg(long, value_name = "PATH")]
     #[arg(required_unless_present_any = ["rehearse", "slide"])]
-    port: Option<PathBuf>,
+    pub port: Option<PathBuf>,
     /// Rehearse on a simulated arm with random errors that the scenario does not know.
     #[arg(long, conflicts_with_all = ["port", "slide"])]
     rehearse: bool,
