@@ -8,6 +8,8 @@ use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
+use painleve_process::lifetime::{Signal, end_with_parent};
+
 const CONVERTER: &str = "rsvg-convert";
 
 /// Pixels of a PNG per CSS pixel of the figure.
@@ -69,7 +71,8 @@ pub fn encoded(path: &Path, svg: String) -> Result<Vec<u8>, PictureError> {
         return Ok(svg.into_bytes());
     };
     let zoom = if format == "png" { PNG_ZOOM } else { "1" };
-    let mut converter = Command::new(CONVERTER)
+    let mut converter = Command::new(CONVERTER);
+    converter
         .args(["--format", format, "--zoom", zoom])
         // Otherwise a PDF holds the present time.
         .env("SOURCE_DATE_EPOCH", "0")
@@ -77,7 +80,8 @@ pub fn encoded(path: &Path, svg: String) -> Result<Vec<u8>, PictureError> {
         .process_group(0)
         .stdin(Stdio::piped())
         .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
+        .stderr(Stdio::piped());
+    let mut converter = end_with_parent(&mut converter, Signal::SIGKILL)
         .spawn()
         .map_err(|_| PictureError::NoConverter(format))?;
     // It reads its whole input before it writes. If it ends earlier, its status and message say why.

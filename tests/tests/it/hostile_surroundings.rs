@@ -305,6 +305,35 @@ fn an_interrupted_rehearsal_ends_with_its_exit_code_and_leaves_nothing() {
 }
 
 #[test]
+fn a_study_interrupted_while_its_figure_is_converted_leaves_neither_files_nor_the_converter() {
+    let bench = Bench::new("converter");
+    let converter =
+        "#!/bin/sh\n[ $1 = --version ] && exit\necho $$ > new\nmv new id\nexec sleep 60\n";
+    fs::write(bench.path("rsvg-convert"), converter).unwrap();
+    let executable = fs::Permissions::from_mode(0o755);
+    fs::set_permissions(bench.path("rsvg-convert"), executable).unwrap();
+    let line = "study bifurcation --mu 0.6 --v-belt=-0.4 --initial a --csv a.csv --svg x.png";
+    let mut study = bench.command(&line.split_whitespace().collect::<Vec<_>>());
+    let path = std::env::var("PATH").unwrap();
+    study.env("PATH", format!("{}:{path}", bench.path("").display()));
+    let study = study.stderr(Stdio::piped()).spawn().unwrap();
+    while !bench.path("id").exists() && is_running(study.id().cast_signed()) {
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    signal(study.id().cast_signed(), Signal::SIGTERM);
+    let output = study.wait_with_output().unwrap();
+    assert_eq!(code(output.status), 130, "{output:?}");
+    assert_eq!(bench.files(), ["id", "rsvg-convert"]);
+    let id = fs::read_to_string(bench.path("id")).unwrap();
+    let id = id.trim().parse().unwrap();
+    let start = Instant::now();
+    while is_running(id) {
+        assert!(start.elapsed() < SOON, "the converter still runs");
+        std::thread::sleep(Duration::from_millis(5));
+    }
+}
+
+#[test]
 fn an_interrupted_export_leaves_nothing() {
     let bench = Bench::new("export");
     let recorded = bench.run(&["run", "--set", "run.duration_s=60", "--record", "run.mcap"]);

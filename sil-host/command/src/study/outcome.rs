@@ -101,14 +101,19 @@ impl OutcomeOptions {
     }
 
     fn write(&self, outcome: &dyn AnyOutcome) -> Result<(), CommandError> {
-        let mut files = Vec::new();
+        let mut contents = Vec::new();
         if let Some(path) = &self.csv {
-            files.push(prepare(path, &outcome.csv().map_err(output)?).map_err(output)?);
+            contents.push((path, outcome.csv().map_err(output)?));
         }
         if let Some(path) = &self.svg {
             let picture = picture::encoded(path, outcome.svg()).map_err(output)?;
-            files.push(prepare(path, &picture).map_err(output)?);
+            contents.push((path, picture));
         }
+        // Only now: whoever interrupts the converter of the figure finds no temporary file.
+        let files = contents
+            .into_iter()
+            .map(|(path, content)| prepare(path, &content));
+        let files = files.collect::<Result<_, _>>().map_err(output)?;
         commit_all(files).map_err(output)?;
         if self.json {
             say(outcome.json().map_err(output)?)
