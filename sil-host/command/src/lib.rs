@@ -142,6 +142,9 @@ enum Command {
 /// Exit code of a process whose peer is missing or has died.
 const PEER_FAILED: u8 = 3;
 
+/// Exit code if an output cannot be written.
+const UNWRITABLE: u8 = 4;
+
 /// Exit code after a panic of this program.
 const INTERNAL_ERROR: u8 = 70;
 
@@ -236,7 +239,7 @@ impl CommandError {
             | Self::Accept(_) => 2,
             Self::Study(error) | Self::Sweep(SweepError::Study(error)) => match error {
                 StudyError::Plant { .. } | StudyError::Loop { .. } => 1,
-                StudyError::Unwritable { .. } => 4,
+                StudyError::Unwritable { .. } => UNWRITABLE,
                 StudyError::Scenario(_)
                 | StudyError::Grid(_)
                 | StudyError::Taken { .. }
@@ -248,7 +251,7 @@ impl CommandError {
                 | StudyError::TooManyRows(_) => 2,
             },
             Self::Sweep(SweepError::Incomplete { .. } | SweepError::Mismatch(_)) => 1,
-            Self::Sweep(SweepError::Output(_)) => 4,
+            Self::Sweep(SweepError::Output(_)) => UNWRITABLE,
             Self::Sweep(_) => 2,
             Self::Board(BoardError::NotAnImage(_)) => 2,
             Self::Loop(LoopError::Plant(_))
@@ -263,7 +266,7 @@ impl CommandError {
             | Self::Cyclictest(_)
             | Self::Rig(_)
             | Self::Process(_) => PEER_FAILED,
-            Self::Loop(LoopError::Monitor(_)) | Self::Output(_) => 4,
+            Self::Loop(LoopError::Monitor(_)) | Self::Output(_) => UNWRITABLE,
             Self::Loop(LoopError::Interrupted) | Self::Interrupted => INTERRUPTED,
             Self::DeadlinesMissed(_) => DEADLINES_MISSED,
             Self::FailedOn(_) => FAILED_ON,

@@ -36,6 +36,9 @@ pub enum OutputError {
     /// A part of a file.
     #[error(transparent)]
     Write(#[from] io::Error),
+    /// A file of another process of the run, as it has reported.
+    #[error("{0}")]
+    Reported(String),
     /// Standard output.
     #[error("cannot write to stdout: {0}")]
     StandardOutput(io::Error),

@@ -23,15 +23,15 @@ use super::fail_on::{self, FailOn};
 use super::join::JoinArguments;
 use super::live;
 use super::output::OutputArguments;
-use super::output_error::{InputError, output};
+use super::output_error::{InputError, OutputError, output};
 use super::patience::PatienceArguments;
 use super::plan::Plan;
 use super::plant::{self, PlantArguments};
 use super::process_error::ProcessError;
-use super::run_process::{RunProcess, WATCH};
+use super::run_process::{RunProcess, WATCH, complaint};
 use super::scenario::ScenarioArguments;
 use super::system_path::SystemPath;
-use super::{CommandError, DEADLINES_MISSED, INTERRUPTED, PEER_FAILED};
+use super::{CommandError, DEADLINES_MISSED, INTERRUPTED, PEER_FAILED, UNWRITABLE};
 
 /// Where the controller runs.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
@@ -276,8 +276,10 @@ pub fn run(arguments: &RunArguments) -> Result<(), CommandError> {
     match controller.wait(CONTROLLER_END)? {
         Some(status) if status.success() => {}
         Some(status) => {
-            let complaint = controller.complaint();
-            return Err(ProcessError::Failed { status, complaint }.into());
+            let text = controller.stderr.text();
+            let complaint = complaint(&text);
+            let failed = || ProcessError::Failed { status, complaint }.into();
+            return Err(unwritable(status, &text).unwrap_or_else(failed));
         }
         None => {
             return Err(ProcessError::Outlived.into());
@@ -305,6 +307,15 @@ pub fn run(arguments: &RunArguments) -> Result<(), CommandError> {
     fail_on::check(&arguments.fail_on, &report)
 }
 
+/// Returns the failure of a controller's process that could not write its file: an output of this command.
+fn unwritable(status: ExitStatus, text: &str) -> Option<CommandError> {
+    (status.code() == Some(i32::from(UNWRITABLE))).then(|| match cause(text) {
+        Some(cause) => output(OutputError::Reported(cause.into())),
+        // With --log, it has been shown.
+        None => CommandError::Told { code: UNWRITABLE },
+    })
+}
+
 /// Returns the failure of a plant whose peer has failed. The plant only knows that the controller has
 /// gone; the controller or the bridge of a board knows why.
 fn peer_failure(
@@ -313,10 +324,15 @@ fn peer_failure(
     status: ExitStatus,
 ) -> Result<CommandError, CommandError> {
     let message = plant.stdout.text();
-    if (controller.wait(CONTROLLER_NOTICE)?).is_some_and(|status| !status.success())
-        && let Some(cause) = cause(&controller.stderr.text())
+    if let Some(status) = controller
+        .wait(CONTROLLER_NOTICE)?
+        .filter(|it| !it.success())
     {
-        return Ok(ProcessError::Reported(cause.into()).into());
+        let text = controller.stderr.text();
+        if let Some(cause) = cause(&text) {
+            let reported = || ProcessError::Reported(cause.into()).into();
+            return Ok(unwritable(status, &text).unwrap_or_else(reported));
+        }
     }
     Ok(match message.trim() {
         "" => failure(status),
@@ -363,12 +379,16 @@ fn watch(
                 if let Some(completed) = plant.child.stop().filter(ExitStatus::success) {
                     return Ok(completed);
                 }
-                return Err(ProcessError::EndedEarly {
-                    process: "controller",
-                    status,
-                    complaint: controller.complaint(),
-                }
-                .into());
+                let text = controller.stderr.text();
+                let ended_early = || {
+                    let error = ProcessError::EndedEarly {
+                        process: "controller",
+                        status,
+                        complaint: complaint(&text),
+                    };
+                    error.into()
+                };
+                return Err(unwritable(status, &text).unwrap_or_else(ended_early));
             }
         }
         for (part, process) in [("plant", &mut *plant), ("controller", &mut *controller)] {

@@ -77,16 +77,13 @@ impl RunProcess {
         };
         self.stopped
     }
+}
 
-    /// Returns the error output of an ended process, as a suffix of another message.
-    pub fn complaint(&mut self) -> String {
-        let text = self.stderr.text();
-        let text = text.trim().trim_start_matches("error: ");
-        if text.is_empty() {
-            String::new()
-        } else {
-            format!(": {text}")
-        }
+/// Returns the error output of an ended process as a suffix of another message.
+pub fn complaint(text: &str) -> String {
+    match text.trim().trim_start_matches("error: ") {
+        "" => String::new(),
+        text => format!(": {text}"),
     }
 }
 

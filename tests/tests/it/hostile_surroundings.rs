@@ -333,6 +333,22 @@ fn a_study_interrupted_while_its_figure_is_converted_leaves_neither_files_nor_th
     }
 }
 
+/// The disk takes the folder of the costs away while the run goes on.
+#[test]
+fn costs_that_cannot_be_written_at_the_end_of_a_run_end_it_with_the_code_of_outputs() {
+    let bench = Bench::new("costs");
+    let line =
+        "run edge --host drivers --set run.duration_s=100 --no-record --no-plot --timing t/t.json";
+    let running = bench.start(&line.split_whitespace().collect::<Vec<_>>());
+    child_of(running.id(), "bridge");
+    fs::remove_dir_all(bench.path("t")).unwrap();
+    fs::write(bench.path("t"), "a file").unwrap();
+    let (output, _) = running.end(Duration::from_secs(60));
+    assert_eq!(code(output.status), 4, "{output:?}");
+    assert!(errors(&output).contains("t/t.json"), "{output:?}");
+    assert_eq!(errors(&output).matches("error: ").count(), 1, "{output:?}");
+}
+
 #[test]
 fn an_interrupted_export_leaves_nothing() {
     let bench = Bench::new("export");
