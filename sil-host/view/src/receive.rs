@@ -2,6 +2,7 @@
 
 use std::io::ErrorKind;
 use std::net::TcpStream;
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
 
 use tungstenite::protocol::CloseFrame;
@@ -27,6 +28,10 @@ pub(crate) fn receive(
     }
 }
 
+/// Connections that are being turned away with patience, and the largest number of them.
+static TURNED_AWAY: AtomicUsize = AtomicUsize::new(0);
+pub(crate) const MOST_TURNED_AWAY: usize = MOST_VIEWERS;
+
 /// Closes the connection of one viewer too many, and tells it why.
 pub(crate) fn turn_away(mut socket: WebSocket<TcpStream>) {
     let reason = format!("{MOST_VIEWERS} viewers of this kind watch the run already: close one");
@@ -37,5 +42,9 @@ pub(crate) fn turn_away(mut socket: WebSocket<TcpStream>) {
     let start = Instant::now();
     let closing = socket.close(Some(frame)).is_ok();
     // Until the viewer has closed it, too: what it sends at once would else end the connection before the reason.
-    while closing && start.elapsed() < PATIENCE && receive(&mut socket).is_ok() {}
+    // A crowd is not waited for.
+    let is_crowd = TURNED_AWAY.fetch_add(1, Ordering::Relaxed) >= MOST_TURNED_AWAY;
+    let waits = closing && !is_crowd;
+    while waits && start.elapsed() < PATIENCE && receive(&mut socket).is_ok() {}
+    TURNED_AWAY.fetch_sub(1, Ordering::Relaxed);
 }

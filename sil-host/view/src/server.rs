@@ -229,7 +229,10 @@ fn upgrade(
     let (stream, read) = connection.into_parts();
     stream.set_read_timeout(Some(INTERVAL))?;
     stream.set_write_timeout(Some(PATIENCE))?;
-    let limits = WebSocketConfig::default().max_message_size(Some(MOST_BYTES));
+    // Of the message alone would not do: memory for a whole frame is taken when its head has arrived.
+    let limits = WebSocketConfig::default()
+        .max_message_size(Some(MOST_BYTES))
+        .max_frame_size(Some(MOST_BYTES));
     let socket = WebSocket::from_partially_read(stream, read, Role::Server, Some(limits));
     Ok(Some(socket))
 }
@@ -253,6 +256,7 @@ mod tests {
 
     use super::*;
     use crate::hub::MOST_VIEWERS;
+    use crate::receive::MOST_TURNED_AWAY;
     use crate::request::ViewerRequest;
 
     fn server(origins: &[String]) -> Server {
@@ -433,6 +437,40 @@ mod tests {
         }
         server.hub.publish(&[1], &[]);
         assert_eq!(viewer.read().unwrap(), Message::binary(vec![1]));
+    }
+
+    #[test]
+    fn a_frame_that_is_longer_than_any_order_is_refused_at_its_head() {
+        let server = server(&[]);
+        let mut socket = viewer(&server);
+        // Text of a mebibyte, masked by zeros, of which nothing comes.
+        let head = b"\x81\xff\0\0\0\0\0\x10\0\0\0\0\0\0";
+        socket.get_mut().write_all(head).unwrap();
+        let mut rest = Vec::new();
+        let start = Instant::now();
+        let ended = socket.get_mut().read_to_end(&mut rest);
+        assert!(start.elapsed() < PATIENCE / 2, "still open: {ended:?}");
+    }
+
+    #[test]
+    fn a_crowd_is_turned_away_at_once() {
+        let server = server(&[]);
+        let viewers: Vec<_> = (0..MOST_VIEWERS).map(|_| viewer(&server)).collect();
+        while server.hub.viewers() < MOST_VIEWERS {
+            thread::sleep(Duration::from_millis(1));
+        }
+        let mut crowd: Vec<_> = (0..2 * MOST_TURNED_AWAY).map(|_| viewer(&server)).collect();
+        thread::sleep(PATIENCE / 4);
+        // Not a reader of messages, which would answer.
+        let is_closed = |socket: &mut WebSocket<TcpStream>| {
+            let stream = socket.get_mut();
+            let _ = stream.set_read_timeout(Some(Duration::from_millis(1)));
+            stream.read_to_end(&mut Vec::new()).is_ok()
+        };
+        let closed = crowd.iter_mut().map(is_closed);
+        let closed = closed.filter(|is_closed| *is_closed).count();
+        assert!(closed >= MOST_TURNED_AWAY, "{closed} closed");
+        drop(viewers);
     }
 
     #[test]
