@@ -9,7 +9,7 @@
 //! replaced. Links of other users are refused.
 
 use std::ffi::{OsStr, OsString};
-use std::fs::{File, TryLockError};
+use std::fs::{self, File, TryLockError};
 use std::hash::{BuildHasher, RandomState};
 use std::io::{self, Seek, SeekFrom, Write};
 use std::os::unix::ffi::OsStrExt;
@@ -128,6 +128,17 @@ impl AtomicFile {
     /// another user, or its folder cannot be created or written to.
     pub fn create(path: impl Into<PathBuf>) -> Result<Self, AtomicFileError> {
         let path = path.into();
+        let folders = path.ancestors().skip(1).map(Path::to_path_buf);
+        let missing: Vec<PathBuf> = folders.take_while(|folder| !folder.exists()).collect();
+        Self::in_folder(path).inspect_err(|_| {
+            for folder in missing {
+                // Of a refused file nothing is left.
+                let _ = fs::remove_dir(folder);
+            }
+        })
+    }
+
+    fn in_folder(path: PathBuf) -> Result<Self, AtomicFileError> {
         let place = match OutputPlace::find(&path) {
             Ok(place) => place,
             Err(error) => return Err(AtomicFileError::of_place(path, error)),
@@ -379,7 +390,6 @@ pub fn prepare(path: impl Into<PathBuf>, contents: &[u8]) -> Result<AtomicFile, 
 mod tests {
     use super::*;
     use nix::unistd::geteuid;
-    use std::fs;
     use std::os::unix::fs::{PermissionsExt, lchown, symlink};
 
     fn names(folder: &Path) -> Vec<String> {
@@ -484,6 +494,53 @@ mod tests {
     }
 
     /// A shared folder in which everybody may put links, as in `/tmp`.
+    #[test]
+    fn a_path_that_ends_like_a_folder_is_none_of_a_file() {
+        let folder = tempfile::tempdir().unwrap();
+        for name in ["new/", "new//", "new/.", "new/deeper/"] {
+            let error = AtomicFile::create(folder.path().join(name)).unwrap_err();
+            let message = error.to_string();
+            assert!(message.contains("cannot be an output file"), "{message}");
+        }
+        assert_eq!(names(folder.path()), [""; 0]);
+    }
+
+    #[test]
+    fn a_refused_file_leaves_no_folder_made_for_it() {
+        let folder = tempfile::tempdir().unwrap();
+        fs::create_dir(folder.path().join("there")).unwrap();
+        let too_long = format!("there/new/deeper/{}.csv", "x".repeat(300));
+        AtomicFile::create(folder.path().join(too_long)).unwrap_err();
+        assert_eq!(names(&folder.path().join("there")), [""; 0]);
+    }
+
+    #[test]
+    fn a_folder_that_must_not_be_read_takes_files_and_folders() {
+        const NOBODY: u32 = 23_002;
+        let folder = tempfile::tempdir().unwrap();
+        let drop_box = folder.path().join("drop-box");
+        fs::create_dir(&drop_box).unwrap();
+        fs::set_permissions(folder.path(), fs::Permissions::from_mode(0o755)).unwrap();
+        fs::set_permissions(&drop_box, fs::Permissions::from_mode(0o300)).unwrap();
+        let is_root = geteuid().is_root();
+        if is_root {
+            lchown(&drop_box, Some(NOBODY), Some(NOBODY)).unwrap();
+        }
+        let writing = || {
+            if is_root {
+                // Root may read everything; this thread alone becomes another user.
+                nix::unistd::setfsuid(NOBODY.into());
+            }
+            assert!(fs::read_dir(&drop_box).is_err());
+            for name in ["a.csv", "new/deeper/a.csv"] {
+                write(drop_box.join(name), b"whole").unwrap();
+                assert_eq!(fs::read(drop_box.join(name)).unwrap(), b"whole");
+            }
+        };
+        std::thread::scope(|scope| scope.spawn(writing).join()).unwrap();
+        fs::set_permissions(&drop_box, fs::Permissions::from_mode(0o700)).unwrap();
+    }
+
     #[test]
     fn links_of_other_users_are_refused_where_they_choose_the_file() {
         const STRANGER: u32 = 23_002;

@@ -8,6 +8,7 @@ use std::ffi::{OsStr, OsString};
 use std::fs::File;
 use std::io;
 use std::os::fd::{AsFd, OwnedFd};
+use std::os::unix::ffi::OsStrExt;
 use std::path::{Component, Path, PathBuf};
 
 use nix::errno::Errno;
@@ -47,7 +48,7 @@ impl OutputPlace {
     /// Follows a path and creates its missing folders.
     pub fn find(path: &Path) -> Result<Self, PlaceError> {
         // Whoever gives `-` expects standard output.
-        if path.file_name().is_none() || path == Path::new("-") {
+        if path.file_name().is_none() || path == Path::new("-") || names_a_folder(path) {
             return Err(PlaceError::NotAFile);
         }
         let mut walk = Walk::new(path)?;
@@ -198,10 +199,16 @@ impl Walk {
         sync(&opened(&self.folder)?)
     }
 
-    /// Returns the present folder, opened for reading its names.
+    /// Returns the present folder, opened for reading its names if it may be read.
     fn readable(&self) -> Result<File, PlaceError> {
         opened(&self.folder).map_err(|error| PlaceError::Folder(self.path.clone(), error.into()))
     }
+}
+
+/// Whether a path ends like that of a folder, which its components do not show.
+fn names_a_folder(path: &Path) -> bool {
+    let path = path.as_os_str().as_bytes();
+    path.ends_with(b"/") || path.ends_with(b"/.")
 }
 
 /// Opens the folder in which a path starts.
@@ -212,8 +219,15 @@ fn start(path: &str) -> Result<OwnedFd, PlaceError> {
 }
 
 fn opened(folder: &impl AsFd) -> Result<File, Errno> {
-    let flags = OFlag::O_RDONLY | OFlag::O_DIRECTORY | OFlag::O_CLOEXEC;
-    openat(folder, ".", flags, Mode::empty()).map(File::from)
+    let open = |access| {
+        let flags = access | OFlag::O_DIRECTORY | OFlag::O_CLOEXEC;
+        openat(folder, ".", flags, Mode::empty()).map(File::from)
+    };
+    match open(OFlag::O_RDONLY) {
+        // Files can be written into a folder whose names must not be read.
+        Err(Errno::EACCES) => open(OFlag::O_PATH),
+        opened => opened,
+    }
 }
 
 fn kind(status: &FileStat) -> u32 {
@@ -223,8 +237,8 @@ fn kind(status: &FileStat) -> u32 {
 /// Writes the names in a folder to the disk.
 pub(crate) fn sync(folder: &File) -> Result<(), Errno> {
     match nix::unistd::fsync(folder) {
-        // Some file systems do not support this.
-        Err(Errno::EINVAL) => Ok(()),
+        // Some file systems do not support this, nor does a folder that must not be read.
+        Err(Errno::EINVAL | Errno::EBADF) => Ok(()),
         other => other,
     }
 }
