@@ -211,9 +211,11 @@ fn joined(points: &[At]) -> String {
     points.join(" ")
 }
 
-/// Escapes text for XML, which does not allow control characters.
+/// Escapes text for XML, which allows neither control characters nor the last two of its first plane.
 fn escaped(text: &str) -> String {
-    markup::escaped(&text.replace(char::is_control, " "))
+    let is_refused =
+        |character: char| character.is_control() || ('\u{fffe}'..='\u{ffff}').contains(&character);
+    markup::escaped(&text.replace(is_refused, " "))
 }
 
 /// Returns a text in which the dot of a time derivative is a full stop raised over its letter. Few
@@ -241,7 +243,12 @@ mod tests {
     #[test]
     fn a_figure_has_a_title_dark_colours_and_escaped_text() {
         let mut canvas = Canvas::default();
-        canvas.text("a < b\u{7}", &LABEL, (1, 2), Anchor::Left);
+        canvas.text(
+            "a < b\u{7}\u{fffe}\u{ffff}\u{fffd}",
+            &LABEL,
+            (1, 2),
+            Anchor::Left,
+        );
         canvas.line(&[(3, 4)], Stroke::solid(BLACK_INK, 4));
         let svg = canvas.finish((20, 10), "T & U", "more");
         for part in [
@@ -249,7 +256,7 @@ mod tests {
             r#"role="img" aria-label="T &amp; U. more""#,
             "<title>T &amp; U</title>",
             "prefers-color-scheme:dark",
-            ">a &lt; b </text>",
+            ">a &lt; b   \u{fffd}</text>",
             r#"<circle cx="3" cy="4" r="4""#,
         ] {
             assert!(svg.contains(part), "{part} is not in {svg}");
