@@ -92,16 +92,32 @@ pub fn encoded(path: &Path, svg: String) -> Result<Vec<u8>, PictureError> {
         .wait_with_output()
         .map_err(|error| PictureError::Failed(error.to_string()))?;
     if !output.status.success() {
-        let message = String::from_utf8_lossy(&output.stderr);
-        let reason = format!("{} ({})", message.trim(), output.status);
+        let reason = format!("{} ({})", in_one_line(&output.stderr), output.status);
         return Err(PictureError::Failed(reason));
     }
     Ok(output.stdout)
 }
 
+/// Returns a program's message of several lines as one.
+fn in_one_line(message: &[u8]) -> String {
+    let message = String::from_utf8_lossy(message);
+    let lines = message.lines().map(str::trim);
+    let lines: Vec<&str> = lines.filter(|line| !line.is_empty()).collect();
+    lines.join("; ")
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_message_of_the_converter_is_one_line() {
+        let message = "Error reading SVG:\n  XML parse error\r\n\nline 3\n";
+        assert_eq!(
+            in_one_line(message.as_bytes()),
+            "Error reading SVG:; XML parse error; line 3"
+        );
+    }
 
     #[test]
     fn the_extension_selects_the_format() {

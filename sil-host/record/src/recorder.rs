@@ -183,14 +183,20 @@ impl Recorder {
     /// Records the remaining samples and completes every file.
     ///
     /// # Errors
-    /// [`RecordError`] if anything could not be written; no file is left then.
+    /// [`RecordError`] if anything could not be written; no file is left then. Without a figure that cannot be converted
+    /// the others are still complete, and are left.
     pub fn finish(mut self) -> Result<(), RecordError> {
         self.hand_over()?;
-        let mut files = Vec::new();
+        let (mut files, mut unconverted) = (Vec::new(), None);
         for sink in self.end()? {
-            files.extend(sink.finish()?);
+            match sink.finish() {
+                Ok(file) => files.extend(file),
+                Err(RecordError::Picture(error)) => unconverted = Some(error),
+                Err(error) => return Err(error),
+            }
         }
-        Ok(commit_all(files)?)
+        commit_all(files)?;
+        unconverted.map_or(Ok(()), |error| Err(error.into()))
     }
 
     /// Keeps the recorded part of a run that ended early. Returns the name of each file, or why it could not be kept;
@@ -306,5 +312,46 @@ impl Recording {
 
     fn event(&mut self, event: &RunEvent) -> Result<(), RecordError> {
         self.sinks.iter_mut().try_for_each(|sink| sink.event(event))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use painleve_plant::scenario::Scenario;
+
+    /// A sink that ends with a file or without.
+    struct Ending(Result<AtomicFile, RecordError>);
+
+    impl Sink for Ending {
+        fn tick(&mut self, _: &RecordedTick<'_>) -> Result<(), RecordError> {
+            Ok(())
+        }
+
+        fn finish(self: Box<Self>) -> Result<Option<AtomicFile>, RecordError> {
+            self.0.map(Some)
+        }
+    }
+
+    #[test]
+    fn a_figure_that_cannot_be_converted_does_not_take_the_record_with_it() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("run.mcap");
+        let scenario = Scenario::load("edge", &[]).unwrap();
+        let finished = |error: RecordError| {
+            let file = AtomicFile::create(&path).unwrap();
+            let sinks = [Ending(Err(error)), Ending(Ok(file))];
+            let sinks = sinks.map(|sink| Box::new(sink) as Box<dyn Sink>);
+            let configuration = scenario.controller_configuration();
+            let recorder = Recorder::start(&configuration, sinks.into()).unwrap();
+            (recorder.finish().unwrap_err(), path.exists())
+        };
+        let (error, is_there) = finished(RecordError::Ended);
+        assert!(matches!(error, RecordError::Ended) && !is_there);
+        let (error, is_there) = finished(PictureError::Failed("no memory".into()).into());
+        assert!(
+            error.to_string().ends_with("no memory") && is_there,
+            "{error}"
+        );
     }
 }
