@@ -30,6 +30,19 @@ pub enum TableError {
         "it has no column {0}: this is not a table of a run's ticks, as `painleve export --csv` writes"
     )]
     NoColumn(&'static str),
+    /// A cell of a column of numbers is none.
+    #[error("line {line}, {column} = '{cell}' is not a number")]
+    NotANumber {
+        /// Line of the file.
+        line: u64,
+        /// The column.
+        column: &'static str,
+        /// What is there.
+        cell: String,
+    },
+    /// There is only a header.
+    #[error("it has no rows, only the names of its columns")]
+    NoRows,
     /// Times do not increase.
     #[error("line {0}: the time is not later than the one before")]
     Order(usize),
@@ -38,7 +51,7 @@ pub enum TableError {
     TooLong,
 }
 
-/// The ticks of a run. A number that is unknown is NaN; so is a text.
+/// The ticks of a run. A number that is unknown is NaN.
 #[derive(Clone, Debug, Default)]
 pub struct RunTable {
     /// Simulated or measured time, s, increasing.
@@ -93,7 +106,7 @@ impl RunTable {
         };
         let mut row = csv::StringRecord::new();
         while reader.read_record(&mut row).map_err(wrong)? {
-            let time_s = number(row.get(time).unwrap_or_default());
+            let time_s = number(&row, TIME, Some(time))?;
             let is_later = read.time_s.last().is_none_or(|last| time_s > *last);
             if !is_later || !time_s.is_finite() {
                 return Err(TableError::Order(read.time_s.len() + 2));
@@ -102,13 +115,12 @@ impl RunTable {
                 return Err(TableError::TooLong);
             }
             read.time_s.push(time_s);
-            for (column, place) in read.columns.iter_mut().zip(&places) {
-                let cell = place.and_then(|place| row.get(place));
-                column.push(number(cell.unwrap_or_default()));
+            for ((column, name), place) in read.columns.iter_mut().zip(names).zip(&places) {
+                column.push(number(&row, name, *place)?);
             }
         }
         if read.time_s.is_empty() {
-            return Err(ExportError::NoTicks.into());
+            return Err(TableError::NoRows);
         }
         Ok(read)
     }
@@ -147,12 +159,23 @@ impl RunTable {
     }
 }
 
-/// Reads a cell: a number, or true or false as 1 or 0; NaN for anything else.
-fn number(cell: &str) -> f64 {
-    match cell {
-        "true" => 1.0,
-        "false" => 0.0,
-        text => text.parse().unwrap_or(f64::NAN),
+/// Reads a cell: a number, or true or false as 1 or 0; NaN if it is empty or the table lacks the column.
+fn number(
+    row: &csv::StringRecord,
+    column: &'static str,
+    place: Option<usize>,
+) -> Result<f64, TableError> {
+    let cell = place.and_then(|place| row.get(place)).unwrap_or_default();
+    match cell.trim() {
+        "" => Ok(f64::NAN),
+        // Python writes them with a capital.
+        "true" | "True" => Ok(1.0),
+        "false" | "False" => Ok(0.0),
+        text => text.parse().map_err(|_| TableError::NotANumber {
+            line: row.position().map_or(0, csv::Position::line),
+            column,
+            cell: cell.into(),
+        }),
     }
 }
 
@@ -169,7 +192,7 @@ mod tests {
     #[test]
     fn cells_are_numbers_truths_or_unknown() {
         let table = read(
-            "time_s,x,plant.tip_t_m,estimates.contact\n0,a,0.1,true\n0.5,b,,false\n1,c,0.3,\n",
+            "time_s,x,plant.tip_t_m,estimates.contact\n0,a,0.1,true\n0.5,b,,False\n1,c, nan ,\n",
         );
         let table = table.unwrap();
         assert_eq!(table.time_s, [0.0, 0.5, 1.0]);
@@ -186,7 +209,15 @@ mod tests {
         for (text, part) in [
             ("a,b\n1,2\n", "no column time_s"),
             ("time_s,b\n1,2\n", "no column plant.tip_t_m"),
-            ("time_s,plant.tip_t_m\n", "no topic"),
+            ("time_s,plant.tip_t_m\n", "it has no rows"),
+            (
+                "time_s,plant.tip_t_m\n0,0.1\n1,hello\n",
+                "line 3, plant.tip_t_m = 'hello' is not a number",
+            ),
+            (
+                "time_s,plant.tip_t_m\nsoon,1\n",
+                "line 2, time_s = 'soon' is not a number",
+            ),
             (
                 "time_s,plant.tip_t_m\n1,2\n1,3\n",
                 "line 3: the time is not later",
