@@ -243,6 +243,7 @@ impl CommandError {
                 StudyError::Scenario(_)
                 | StudyError::Grid(_)
                 | StudyError::Taken { .. }
+                | StudyError::Ignored { .. }
                 | StudyError::OutOfReach { .. }
                 | StudyError::OffTheBelt { .. }
                 | StudyError::NothingAdmissible

@@ -20,12 +20,7 @@ pub(super) fn with_override(mut scenario: Scenario, text: &str) -> Result<Scenar
     if key.split('.').count() > MOST_LEVELS {
         return Err(ScenarioError::TooDeep);
     }
-    // A bare word is a string, so that names need no nested quotes.
-    let value = format!("value = {value}")
-        .parse::<Table>()
-        .ok()
-        .and_then(|mut table| table.remove("value"))
-        .unwrap_or_else(|| Value::String(value.into()));
+    let value = parsed(value);
     let wrong_key = |source| ScenarioError::Key {
         origin: None,
         key: key.into(),
@@ -93,11 +88,72 @@ pub(super) fn with_override(mut scenario: Scenario, text: &str) -> Result<Scenar
     from_table(None, table).map_err(|error| missing.flatten().map_or(error, wrong_key))
 }
 
+/// Returns the key by which an override `key=value` sets `taken`: a key inside it is its own, a table around it that
+/// contains it sets `taken`. `None` if the override leaves it alone.
+pub fn sets<'a>(text: &'a str, taken: &'a str) -> Option<&'a str> {
+    let (key, value) = text.split_once('=').unwrap_or((text, ""));
+    let (key, value) = (key.trim(), value.trim());
+    if key == taken || inside(key, taken).is_some() {
+        return Some(key);
+    }
+    let (rest, value) = (inside(taken, key)?, parsed(value));
+    let set = rest
+        .split('.')
+        .try_fold(&value, |value, part| value.get(part));
+    set.map(|_| taken)
+}
+
+/// Returns the rest of a key that lies inside another.
+fn inside<'a>(key: &'a str, outer: &str) -> Option<&'a str> {
+    key.strip_prefix(outer)?.strip_prefix('.')
+}
+
+/// Reads the value of an override. A bare word is a string, so that names need no nested quotes.
+fn parsed(value: &str) -> Value {
+    format!("value = {value}")
+        .parse::<Table>()
+        .ok()
+        .and_then(|mut table| table.remove("value"))
+        .unwrap_or_else(|| Value::String(value.into()))
+}
+
 /// Returns the name of the variant that a choice without a tag has.
 fn variant_name(choice: &Value) -> String {
     match choice {
         Value::String(name) => name.clone(),
         Value::Table(table) => table.keys().next().cloned().unwrap_or_default(),
         other => other.to_string(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::sets;
+
+    #[test]
+    fn an_override_sets_its_key_and_what_its_table_contains() {
+        for (text, set) in [
+            ("belt.friction=0.9", Some("belt.friction")),
+            (" belt.friction = 0.9", Some("belt.friction")),
+            (
+                "belt.friction.of.nothing=1",
+                Some("belt.friction.of.nothing"),
+            ),
+            ("belt={friction=0.9}", Some("belt.friction")),
+            ("belt={ \"friction\" = 0.9 }", Some("belt.friction")),
+            ("belt={profile={kind='constant',speed_m_s=-0.4}}", None),
+            ("belt=friction", None),
+            ("belt.frictional=1", None),
+            ("belt", None),
+            ("bel={friction=0.9}", None),
+        ] {
+            assert_eq!(sets(text, "belt.friction"), set, "{text}");
+        }
+        let deep = "controller.law.hybrid.friction";
+        assert_eq!(
+            sets("controller={law={hybrid={friction='model'}}}", deep),
+            Some(deep)
+        );
+        assert_eq!(sets("controller.law=hybrid", deep), None);
     }
 }

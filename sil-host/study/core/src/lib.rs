@@ -50,6 +50,16 @@ pub enum StudyError {
         /// The option.
         option: String,
     },
+    /// The scenario has something that the study does not compute.
+    #[error(
+        "scenario {scenario}: {setting} has no effect here: this study computes the arm without it"
+    )]
+    Ignored {
+        /// The scenario.
+        scenario: String,
+        /// Its setting.
+        setting: &'static str,
+    },
     /// Levels without exactly one effect whose levels they are.
     #[error("--level needs exactly one effect other than none in --effect")]
     LevelsOfSeveralEffects,

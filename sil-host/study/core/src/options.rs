@@ -8,7 +8,8 @@ use std::ops::RangeInclusive;
 use std::str::FromStr;
 
 use clap::{Args, ValueEnum};
-use painleve_plant::scenario::Scenario;
+use painleve_plant::mechanics::compliant::ContactKind;
+use painleve_plant::scenario::{self, Scenario};
 use painleve_shared::Posture;
 
 use crate::case::{ControllerChoice, ConverterChoice};
@@ -33,13 +34,34 @@ impl BaseOptions {
     /// the keys that the study's own options set, with the option of each.
     ///
     /// # Errors
-    /// [`StudyError`] if the scenario is invalid, or if it sets a key in `taken`.
+    /// [`StudyError`] if the scenario is invalid, if it sets a key in `taken`, or if it has an effect: studies that start
+    /// from it alone compute the arm without.
     pub fn load(&self, taken: &[(&str, &str)]) -> Result<Scenario, StudyError> {
         self.overrides.refuse(taken)?;
-        Ok(Scenario::load_unplaced(
-            &self.scenario,
-            &self.overrides.overrides,
-        )?)
+        let scenario = Scenario::load_unplaced(&self.scenario, &self.overrides.overrides)?;
+        match scenario.effects.first_on(&scenario.arm) {
+            Some(key) => Err(self.ignored(key)),
+            None => Ok(scenario),
+        }
+    }
+
+    /// Returns the scenario like [`load`](Self::load), for a study that computes the arm on a rigid contact.
+    ///
+    /// # Errors
+    /// As [`load`](Self::load), and [`StudyError::Ignored`] if the contact is compliant.
+    pub fn load_rigid(&self, taken: &[(&str, &str)]) -> Result<Scenario, StudyError> {
+        let scenario = self.load(taken)?;
+        match scenario.contact.kind {
+            ContactKind::Rigid => Ok(scenario),
+            ContactKind::Compliant => Err(self.ignored("contact.kind = \"compliant\"")),
+        }
+    }
+
+    fn ignored(&self, setting: &'static str) -> StudyError {
+        StudyError::Ignored {
+            scenario: self.scenario.clone(),
+            setting,
+        }
     }
 }
 
@@ -57,15 +79,12 @@ impl Overrides {
     /// # Errors
     /// [`StudyError::Taken`] naming the option to use instead.
     pub fn refuse(&self, taken: &[(&str, &str)]) -> Result<(), StudyError> {
-        for text in &self.overrides {
-            let key = text.split('=').next().unwrap_or_default().trim();
-            let inside = |taken: &str| {
-                key == taken
-                    || key
-                        .strip_prefix(taken)
-                        .is_some_and(|rest| rest.starts_with('.'))
-            };
-            if let Some((_, option)) = taken.iter().find(|(taken, _)| inside(taken)) {
+        let pairs = self
+            .overrides
+            .iter()
+            .flat_map(|text| taken.iter().map(move |taken| (text, taken)));
+        for (text, (taken, option)) in pairs {
+            if let Some(key) = scenario::sets(text, taken) {
                 return Err(StudyError::Taken {
                     key: key.to_owned(),
                     option: (*option).to_owned(),
@@ -259,4 +278,57 @@ pub fn number<N: FromStr + PartialOrd + Display>(
 ) -> Result<N, String> {
     let number = text.parse().ok().filter(|number| range.contains(number));
     number.ok_or_else(|| format!("give {what} from {} to {}", range.start(), range.end()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn options(overrides: &[&str]) -> BaseOptions {
+        let overrides = overrides.iter().map(ToString::to_string).collect();
+        BaseOptions {
+            scenario: OPEN_LOOP.into(),
+            overrides: Overrides { overrides },
+        }
+    }
+
+    #[test]
+    fn a_table_around_a_taken_key_is_refused_if_it_sets_the_key() {
+        let load = |text| options(&[text]).load(&[("belt.friction", "--mu")]);
+        for text in ["belt.friction=0.9", "belt={friction=0.9}"] {
+            let message = load(text).unwrap_err().to_string();
+            assert_eq!(message, "belt.friction has no effect here; use --mu");
+        }
+        let other = load("belt={profile={kind='constant',speed_m_s=-0.7}}").unwrap();
+        assert_eq!(other.belt.profile.speed_m_s(0.0), -0.7);
+    }
+
+    #[test]
+    fn what_a_study_does_not_compute_is_refused() {
+        let soft = "contact.kind=compliant";
+        for (overrides, named) in [
+            (
+                &[soft, "effects.surface.step_height_m=0.005"][..],
+                "effects.surface",
+            ),
+            (
+                &[soft, "arm.coulomb_friction_nm=[0.5,0.5]"],
+                "arm.coulomb_friction_nm",
+            ),
+        ] {
+            let message = options(overrides).load(&[]).unwrap_err().to_string();
+            assert!(
+                message.starts_with("scenario open-loop-bounce: "),
+                "{message}"
+            );
+            assert!(message.contains(named), "{message}");
+        }
+        assert!(options(&[soft]).load(&[]).is_ok());
+        assert!(options(&[]).load_rigid(&[]).is_ok());
+        let message = options(&[soft]).load_rigid(&[]).unwrap_err().to_string();
+        assert!(
+            message.contains("contact.kind = \"compliant\" has no effect here"),
+            "{message}"
+        );
+    }
 }

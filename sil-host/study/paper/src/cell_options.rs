@@ -33,7 +33,7 @@ impl CellOptions {
     /// # Errors
     /// [`StudyError`] naming the option or key that is wrong.
     pub fn cells(&self) -> Result<Cells, StudyError> {
-        let scenario = self.base.load(&[
+        let scenario = self.base.load_rigid(&[
             ("belt.friction", "--mu"),
             ("belt.profile", "--v-belt"),
             ("initial", "--initial"),

@@ -69,7 +69,7 @@ impl StudyOptions for Options {
     type Outcome = Regions;
 
     fn study(&self) -> Result<RegionsStudy, StudyError> {
-        let scenario = self.base.load(&[("belt.friction", "--mu")])?;
+        let scenario = self.base.load_rigid(&[("belt.friction", "--mu")])?;
         let slips = self.slip.iter().map(|slip| match slip {
             SlipOption::Positive => Slip::Positive,
             SlipOption::Negative => Slip::Negative,
