@@ -39,6 +39,12 @@ pub enum OutputError {
     /// A file of another process of the run, as it has reported.
     #[error("{0}")]
     Reported(String),
+    /// A temporary file.
+    #[error(
+        "cannot write a temporary file in {}: {}; set TMPDIR to a folder that can be written",
+        std::env::temp_dir().display(), .0
+    )]
+    Temporary(io::Error),
     /// Standard output.
     #[error("cannot write to stdout: {0}")]
     StandardOutput(io::Error),
@@ -173,6 +179,9 @@ pub enum InputError {
         /// What it needs.
         needed: &'static str,
     },
+    /// Standard input cannot be read.
+    #[error("cannot read standard input: {0}")]
+    StandardInput(io::Error),
     /// A record cannot be read.
     #[error("cannot read {}: {source}", path.display())]
     Record {

@@ -1,6 +1,6 @@
 //! The scenario of a run, as its options select it.
 
-use std::io::Read;
+use std::io::{self, Read, Write};
 
 use clap::{Args, ValueEnum};
 use painleve_files::input_file;
@@ -11,7 +11,8 @@ use serde::{Deserialize, Serialize};
 use tempfile::NamedTempFile;
 
 use super::CommandError;
-use super::output_error::InputError;
+use super::output_error::{InputError, OutputError};
+use super::system_path::SystemPath;
 
 /// A run of the robustness campaign.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
@@ -63,6 +64,9 @@ pub struct ScenarioArguments {
     /// As fast as possible and deterministic, or in real time.
     #[arg(long, value_enum, default_value = "lockstep")]
     pub pacing: Pacing,
+    /// The copy of standard input, once there is one.
+    #[arg(skip)]
+    copy: Option<SystemPath>,
 }
 
 impl ScenarioArguments {
@@ -83,7 +87,10 @@ impl ScenarioArguments {
                 let drawn = robustness::scenario(self.arms.unwrap_or_default(), seed, index)?;
                 Ok(drawn.with_overrides("replayed run", &self.overrides)?)
             }
-            None => Ok(Scenario::load(self.name(), &self.overrides)?),
+            None => Ok(match &self.copy {
+                Some(copy) => Scenario::load_standard_input(copy, &self.overrides)?,
+                None => Scenario::load(self.name(), &self.overrides)?,
+            }),
         }
     }
 
@@ -111,17 +118,29 @@ impl ScenarioArguments {
         if self.replay.is_some() || self.name() != "-" {
             return Ok(None);
         }
-        let mut file = tempfile::Builder::new()
-            .prefix("painleve-standard-input-")
-            .suffix(".toml")
-            .tempfile()?;
-        input_file::remember_standard_input()?;
-        // As much as of a file, so that an endless input is refused as one.
-        let input = std::io::stdin().lock().take(input_file::MOST_BYTES + 1);
-        std::io::copy(&mut { input }, &mut file)?;
-        self.option = Some(file.path().display().to_string());
+        let text = standard_input().map_err(InputError::StandardInput)?;
+        let file = temporary_file(&text).map_err(OutputError::Temporary)?;
+        self.copy = Some(file.path().as_os_str().to_owned().into());
         Ok(Some(file))
     }
+}
+
+fn standard_input() -> io::Result<Vec<u8>> {
+    input_file::remember_standard_input()?;
+    let mut text = Vec::new();
+    // As much as of a file, so that an endless input is refused as one.
+    let input = io::stdin().lock().take(input_file::MOST_BYTES + 1);
+    { input }.read_to_end(&mut text)?;
+    Ok(text)
+}
+
+fn temporary_file(text: &[u8]) -> io::Result<NamedTempFile> {
+    let mut file = tempfile::Builder::new()
+        .prefix("painleve-standard-input-")
+        .suffix(".toml")
+        .tempfile()?;
+    file.write_all(text)?;
+    Ok(file)
 }
 
 /// Returns the option that overrides a key, for a shell, on a line of its own.

@@ -1,7 +1,5 @@
 //! Why a scenario cannot be loaded, in one sentence for the user.
 
-use std::path::PathBuf;
-
 use painleve_shared::range::OutOfRange;
 use painleve_shared::settings::Field;
 
@@ -24,18 +22,18 @@ pub enum ScenarioError {
         name: String,
     },
     /// The file cannot be read.
-    #[error("cannot read scenario file {}: {source}", path.display())]
+    #[error("cannot read {origin}: {source}")]
     Unreadable {
         /// The file.
-        path: PathBuf,
+        origin: String,
         /// Reason.
         source: std::io::Error,
     },
     /// The file is empty.
-    #[error("scenario file {} is empty", path.display())]
+    #[error("{origin} is empty")]
     Empty {
         /// The file.
-        path: PathBuf,
+        origin: String,
     },
     /// The text is not TOML.
     #[error("{origin} is not TOML: {source}")]

@@ -1,6 +1,6 @@
 //! Scenarios from names, files and overrides.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use painleve_files::input_file;
 use painleve_shared::settings::Settings;
@@ -21,12 +21,18 @@ impl Scenario {
     /// [`ScenarioError`] in one sentence for the user.
     pub fn load(name: &str, overrides: &[String]) -> Result<Self, ScenarioError> {
         let scenario = Self::load_unplaced(name, overrides)?;
-        let plant = BuiltInPlant::new(&scenario);
-        plant.map_err(|source| ScenarioError::Range {
-            origin: origin(name),
-            source,
-        })?;
-        Ok(scenario)
+        scenario.checked_start(&origin(name))
+    }
+
+    /// Loads a scenario like [`load`](Self::load) from the copy of standard input in a file.
+    ///
+    /// # Errors
+    /// [`ScenarioError`] in one sentence for the user, who knows nothing of the copy.
+    pub fn load_standard_input(copy: &Path, overrides: &[String]) -> Result<Self, ScenarioError> {
+        let origin = "standard input";
+        let table = read_file(copy, origin)?;
+        let scenario = from_table(Some(origin), table)?.with_overrides(origin, overrides)?;
+        scenario.checked_start(origin)
     }
 
     /// Loads a scenario like [`load`](Self::load), but without checking the start against the belt,
@@ -46,6 +52,17 @@ impl Scenario {
     pub fn from_toml(text: &str) -> Result<Self, ScenarioError> {
         let origin = "scenario";
         from_table(Some(origin), parse(origin, text)?)?.with_overrides(origin, &[])
+    }
+
+    /// Returns this scenario if the arm can start where it says.
+    fn checked_start(self, origin: &str) -> Result<Self, ScenarioError> {
+        match BuiltInPlant::new(&self) {
+            Ok(_) => Ok(self),
+            Err(source) => Err(ScenarioError::Range {
+                origin: origin.into(),
+                source,
+            }),
+        }
     }
 
     /// Returns this scenario with overrides `key=value` applied in order and validated, except for the
@@ -104,13 +121,19 @@ fn read(name: &str) -> Result<Table, ScenarioError> {
     if !path.exists() {
         return Err(ScenarioError::Unknown { name: name.into() });
     }
-    let text = input_file::read(&path).map_err(|source| ScenarioError::Unreadable {
-        path: path.clone(),
+    read_file(&path, &origin)
+}
+
+fn read_file(path: &Path, origin: &str) -> Result<Table, ScenarioError> {
+    let text = input_file::read(path).map_err(|source| ScenarioError::Unreadable {
+        origin: origin.into(),
         source,
     })?;
-    let mut table = parse(&origin, &text)?;
+    let mut table = parse(origin, &text)?;
     if table.is_empty() {
-        return Err(ScenarioError::Empty { path });
+        return Err(ScenarioError::Empty {
+            origin: origin.into(),
+        });
     }
     if let (false, Some(stem)) = (table.contains_key("name"), path.file_stem()) {
         table.insert("name".into(), Value::String(stem.to_string_lossy().into()));
@@ -344,5 +367,30 @@ mod tests {
         assert!(missing("no-such-scenario").contains("'; known: hybrid-elbow-down"));
         assert!(missing("edgee").contains("did you mean 'edge'?"));
         assert!(Scenario::load(folder.path().to_str().unwrap(), &[]).is_err());
+    }
+
+    #[test]
+    fn mistakes_on_standard_input_do_not_name_its_copy() {
+        let copy = tempfile::NamedTempFile::new().unwrap();
+        for (text, expected) in [
+            ("", "cannot read standard input: it is empty"),
+            ("# nothing", "standard input is empty"),
+            ("[belt", "standard input is not TOML"),
+            ("belt.frction = 1", "standard input: belt"),
+            ("belt.friction = 99", "standard input: belt.friction = 99"),
+            (
+                "initial.theta1_deg = 0",
+                "standard input: initial tip height",
+            ),
+            (
+                "effects.gear.elastic = true",
+                "standard input: effects.gear",
+            ),
+        ] {
+            std::fs::write(copy.path(), text).unwrap();
+            let error = Scenario::load_standard_input(copy.path(), &[]).unwrap_err();
+            let message = error.to_string();
+            assert!(message.starts_with(expected), "{message}");
+        }
     }
 }
