@@ -42,5 +42,5 @@ pub fn of_record(path: &Path) -> Result<Scenario, CommandError> {
         .map_err(|damage| InputError::record(path, damage))?;
     let settings = notes.and_then(|mut notes| notes.remove("configuration"));
     let settings = settings.ok_or_else(|| InputError::record(path, RecordFileError::NoSettings))?;
-    Ok(Scenario::from_toml(&settings)?)
+    Ok(Scenario::of_record(path, &settings)?)
 }

@@ -40,6 +40,13 @@ impl Content for BeltRows {
             positions_m,
         })
     }
+
+    fn unread() -> Self {
+        Self {
+            points: vec![(0.0, 0.0)],
+            positions_m: vec![0.0],
+        }
+    }
 }
 
 impl BeltRows {

@@ -12,18 +12,37 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 /// A file that a scenario has loaded.
 type Loaded = (String, Arc<dyn Any + Send + Sync>);
 
+/// What a scenario that names a file may do with it.
+enum Access {
+    /// Read it.
+    Read,
+    /// Only keep what has been loaded from it: the files of the scenarios written so far in [`without_files`].
+    Keep(Vec<Loaded>),
+    /// Nothing: only its path counts.
+    PathOnly,
+}
+
 thread_local! {
-    /// The files of the scenarios written so far in [`without_files`]; `None` outside.
-    static KEPT: RefCell<Option<Vec<Loaded>>> = const { RefCell::new(None) };
+    static ACCESS: RefCell<Access> = const { RefCell::new(Access::Read) };
 }
 
 /// Runs `act`, in which no scenario reads a file: one that is written and read again keeps the content of the
 /// files that it names, and every other file is refused. For requests from those who may not read what this
 /// process may.
 pub(crate) fn without_files<T>(act: impl FnOnce() -> T) -> T {
-    let outer = KEPT.replace(Some(Vec::new()));
+    with_access(Access::Keep(Vec::new()), act)
+}
+
+/// Runs `act`, in which a scenario takes the paths of its files as texts and opens none. Such a scenario can be shown
+/// and compared, but has nothing to run with.
+pub(crate) fn with_paths_only<T>(act: impl FnOnce() -> T) -> T {
+    with_access(Access::PathOnly, act)
+}
+
+fn with_access<T>(access: Access, act: impl FnOnce() -> T) -> T {
+    let outer = ACCESS.replace(access);
     let done = act();
-    KEPT.set(outer);
+    ACCESS.set(outer);
     done
 }
 
@@ -32,10 +51,10 @@ pub(crate) fn without_files<T>(act: impl FnOnce() -> T) -> T {
 /// # Errors
 /// One sentence with the path; it does not tell whether there is such a file.
 pub(crate) fn check_permitted(path: &str) -> Result<(), String> {
-    if KEPT.with_borrow(Option::is_some) {
-        return Err(format!("a viewer cannot name a file, such as '{path}'"));
+    match ACCESS.with_borrow(|access| matches!(access, Access::Read)) {
+        true => Ok(()),
+        false => Err(format!("a viewer cannot name a file, such as '{path}'")),
     }
-    Ok(())
 }
 
 /// What a file contains.
@@ -45,6 +64,9 @@ pub trait Content: Clone + std::fmt::Debug + PartialEq + Send + Sync + 'static {
     /// # Errors
     /// One sentence with the path and the invalid line.
     fn read(path: &str) -> Result<Self, String>;
+
+    /// Returns what stands for a file of which only the path counts.
+    fn unread() -> Self;
 }
 
 /// The content of a file. Scenarios contain the file's path.
@@ -60,7 +82,7 @@ impl<C: Content> FromFile<C> {
     /// # Errors
     /// One sentence with the path and the invalid line.
     pub fn read(path: &str) -> Result<Self, String> {
-        let content = match Self::kept(path) {
+        let content = match Self::known(path) {
             Some(content) => content,
             None => Arc::new(C::read(path)?),
         };
@@ -70,14 +92,16 @@ impl<C: Content> FromFile<C> {
         })
     }
 
-    /// Returns what a scenario has loaded from this file, in [`without_files`].
-    fn kept(path: &str) -> Option<Arc<C>> {
-        KEPT.with_borrow(|kept| {
-            let mut known = kept.iter().flatten();
-            known.find_map(|(file, content)| {
+    /// Returns what a scenario has loaded from this file, in [`without_files`], or what stands for it, in
+    /// [`with_paths_only`].
+    fn known(path: &str) -> Option<Arc<C>> {
+        ACCESS.with_borrow(|access| match access {
+            Access::Read => None,
+            Access::Keep(kept) => kept.iter().find_map(|(file, content)| {
                 let content = (file == path).then(|| content.clone())?;
                 content.downcast().ok()
-            })
+            }),
+            Access::PathOnly => Some(Arc::new(C::unread())),
         })
     }
 }
@@ -101,8 +125,8 @@ impl<C: Content> SettingValue for FromFile<C> {
 
 impl<C: Content> Serialize for FromFile<C> {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        KEPT.with_borrow_mut(|kept| {
-            if let Some(kept) = kept {
+        ACCESS.with_borrow_mut(|access| {
+            if let Access::Keep(kept) = access {
                 kept.push((self.path.clone(), self.content.clone()));
             }
         });

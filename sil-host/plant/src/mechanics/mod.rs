@@ -38,7 +38,7 @@ pub mod turned_pose;
 
 pub use arm_on_belt::ArmOnBelt;
 pub use built_in::BuiltInPlant;
-pub(crate) use from_file::without_files;
+pub(crate) use from_file::{with_paths_only, without_files};
 pub use motion_error::MotionError;
 pub use parameters::{Elbow, InitialState, PlantParameters, SolverSettings};
 pub use probe::{ArmProbe, ArmStep};

@@ -11,7 +11,7 @@ use super::override_key::with_override;
 use super::table::{from_table, parse};
 use super::{Scenario, built_in};
 use crate::mechanics::compliant::ContactKind;
-use crate::mechanics::{BuiltInPlant, without_files};
+use crate::mechanics::{BuiltInPlant, with_paths_only, without_files};
 
 impl Scenario {
     /// Loads the built-in scenario or file called `name`, applies the overrides `key=value` in
@@ -52,6 +52,17 @@ impl Scenario {
     pub fn from_toml(text: &str) -> Result<Self, ScenarioError> {
         let origin = "scenario";
         from_table(Some(origin), parse(origin, text)?)?.with_overrides(origin, &[])
+    }
+
+    /// Reads the scenario of a record from its TOML text, without the files that it names: they may have changed since, or
+    /// be elsewhere. It is to be shown and compared, not run.
+    ///
+    /// # Errors
+    /// [`ScenarioError`] in one sentence for the user, which names the record.
+    pub fn of_record(record: &Path, text: &str) -> Result<Self, ScenarioError> {
+        let origin = format!("record {}", record.display());
+        let table = parse(&origin, text)?;
+        with_paths_only(|| from_table(Some(&origin), table)?.with_overrides(&origin, &[]))
     }
 
     /// Returns this scenario if the arm can start where it says.
@@ -392,5 +403,32 @@ mod tests {
             let message = error.to_string();
             assert!(message.starts_with(expected), "{message}");
         }
+    }
+
+    #[test]
+    fn the_scenario_of_a_record_needs_no_file() {
+        let of_record = |text: &str| Scenario::of_record(Path::new("r.mcap"), text);
+        let text = "belt.profile = { kind = \"file\", path = \"/nowhere/belt.csv\" }
+            contact.kind = \"compliant\"
+            effects.friction = { kind = \"file\", path = \"/nowhere/friction.csv\" }";
+        let scenario = of_record(text).unwrap();
+        let brief = scenario.to_brief_toml();
+        for path in ["/nowhere/belt.csv", "/nowhere/friction.csv"] {
+            assert!(brief.contains(path), "{brief}");
+        }
+        assert!(scenario.differences(&of_record(text).unwrap()).is_empty());
+        let other = of_record(&text.replace("belt.csv", "other.csv")).unwrap();
+        assert_eq!(scenario.differences(&other).len(), 1);
+        // Elsewhere files are read as before.
+        let message = Scenario::from_toml(text).unwrap_err().to_string();
+        assert!(
+            message.contains("cannot read /nowhere/belt.csv"),
+            "{message}"
+        );
+        let message = of_record("belt.friction = 99").unwrap_err().to_string();
+        assert!(
+            message.starts_with("record r.mcap: belt.friction = 99"),
+            "{message}"
+        );
     }
 }

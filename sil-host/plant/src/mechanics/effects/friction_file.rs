@@ -42,6 +42,13 @@ impl Content for FrictionRows {
             points,
         })
     }
+
+    fn unread() -> Self {
+        Self {
+            along_belt: false,
+            points: Vec::new(),
+        }
+    }
 }
 
 impl FrictionRows {
