@@ -38,10 +38,11 @@ mod system_path;
 mod timing;
 mod tune;
 
+use std::ffi::OsStr;
 use std::io::Write;
 use std::num::NonZeroUsize;
 use std::panic::{self, AssertUnwindSafe, PanicHookInfo};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
@@ -49,7 +50,8 @@ use std::time::Duration;
 use painleve_shared::status::Fault;
 
 use clap::builder::{PathBufValueParser, TypedValueParser};
-use clap::{Parser, Subcommand};
+use clap::error::{ContextKind, ContextValue, ErrorKind};
+use clap::{CommandFactory, Parser, Subcommand};
 use painleve_accept::AcceptError;
 use painleve_board::BoardError;
 use painleve_board::timing::CyclictestError;
@@ -59,7 +61,7 @@ use painleve_identify::Refusal;
 use painleve_link::LinkError;
 use painleve_plant::closed_loop::LoopError;
 use painleve_plant::law_choice::{self, ScenarioLaws};
-use painleve_plant::scenario::ScenarioError;
+use painleve_plant::scenario::{ScenarioError, built_in, known_names};
 use painleve_process::interrupt::{self, Interrupt, exit_when_requested, ignore_file_size_limit};
 use painleve_process::memory_full::exit_when_shared_memory_is_full;
 use painleve_process::terminal::{self, warn};
@@ -311,11 +313,35 @@ fn tell_usage(usage: &clap::Error) -> ExitCode {
         ));
         return ExitCode::from(2);
     }
+    let first = std::env::args_os().nth(1);
+    if let Some(mistake) = mistaken_command(usage, first.as_deref().and_then(OsStr::to_str)) {
+        warn(format_args!("error: {mistake}"));
+        return ExitCode::from(2);
+    }
     let written = usage.print().and_then(|()| std::io::stdout().flush());
     match written.map_err(unsaid) {
         Err(error) if !usage.use_stderr() => exit_code_of(&error),
         _ => u8::try_from(usage.exit_code()).unwrap_or(2).into(),
     }
+}
+
+/// Says what is wrong with a command that was taken for the name of a scenario: clap then blames the word after it.
+/// `first` is the first word of the command line.
+fn mistaken_command(usage: &clap::Error, first: Option<&str>) -> Option<String> {
+    let first = first.filter(|word| !word.starts_with('-'))?;
+    let Some(ContextValue::String(word)) = usage.get(ContextKind::InvalidSubcommand) else {
+        return None;
+    };
+    let cli = Cli::command();
+    let commands: Vec<&str> = cli.get_subcommands().map(clap::Command::get_name).collect();
+    if usage.kind() != ErrorKind::ArgumentConflict || commands.contains(&first) {
+        return None;
+    }
+    let is_scenario = built_in::text(first).is_some() || Path::new(first).exists();
+    Some(match is_scenario {
+        true => format!("unexpected '{word}' after the scenario '{first}'"),
+        false => format!("no command '{first}'; {}", known_names(first, &commands)),
+    })
 }
 
 /// Prints an error, unless it has been printed or nobody wants it, and returns the exit code of the process.
@@ -513,5 +539,43 @@ fn execute(command: Command) -> Result<(), CommandError> {
         Command::Study(arguments) => study::run(&arguments),
         Command::Sweep(arguments) => sweep::run(&arguments),
         Command::Figures(arguments) => figures::run(&arguments),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_misspelt_command_is_not_taken_for_a_scenario() {
+        let said = |line: &[&str]| {
+            let words = ["painleve"].iter().chain(line);
+            let usage = Cli::try_parse_from(words).unwrap_err();
+            mistaken_command(&usage, line.first().copied())
+        };
+        for (line, start) in [
+            (
+                &["stduy", "admissible"][..],
+                "no command 'stduy'; did you mean 'study'? known: run,",
+            ),
+            (
+                &["exprt", "out/run.mcap", "--csv"],
+                "no command 'exprt'; did you mean 'export'? ",
+            ),
+            (
+                &["edge", "study"],
+                "unexpected 'study' after the scenario 'edge'",
+            ),
+        ] {
+            let message = said(line).unwrap();
+            assert!(message.starts_with(start), "{message}");
+        }
+        for told_by_clap in [
+            &["--no-record", "edge", "run"][..],
+            &["study", "nothing"],
+            &["edge", "--nothing"],
+        ] {
+            assert_eq!(said(told_by_clap), None, "{told_by_clap:?}");
+        }
     }
 }
