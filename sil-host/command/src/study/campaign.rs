@@ -182,6 +182,10 @@ mod tests {
                 "known: initial, mu",
             ),
             (campaign("bifurcation", &[seed]), "--seed"),
+            (
+                campaign("effects", &[("effect", &["payloads"])]),
+                "'--effect <EFFECTS>'; did you mean 'payload'? known: none, ",
+            ),
             (campaign("bifurcation", &[("mu", &["0:1:0"])]), "step 0"),
             (campaign("bifurcation", &[("mu", &["-1"])]), "--mu = -1"),
             (

@@ -10,6 +10,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+use clap::error::{ContextKind, ContextValue};
 use painleve_files::input_file;
 use painleve_plant::scenario::{TomlError, known_names};
 use painleve_study_core::StudyError;
@@ -67,11 +68,22 @@ pub enum CampaignError {
     Study(#[from] StudyError),
 }
 
-/// Returns clap's message without its hints for the command line.
+/// Returns clap's message with the allowed values, if they have names, but without its hints for the command line.
 fn first_sentence(error: &clap::Error) -> String {
     let text = error.to_string();
     let sentence = text.lines().next().unwrap_or_default();
-    sentence.trim_start_matches("error: ").to_owned()
+    let sentence = sentence.trim_start_matches("error: ");
+    match (
+        error.get(ContextKind::InvalidValue),
+        error.get(ContextKind::ValidValue),
+    ) {
+        (Some(ContextValue::String(value)), Some(ContextValue::Strings(known)))
+            if !known.is_empty() =>
+        {
+            format!("{sentence}; {}", known_names(value, known))
+        }
+        _ => sentence.to_owned(),
+    }
 }
 
 /// A study and its options.
