@@ -33,7 +33,7 @@ pub struct AcceptArguments {
 pub fn run(arguments: &AcceptArguments) -> Result<(), CommandError> {
     let page = &arguments.output;
     let object = page.with_extension("json");
-    distinct_files::check(&[("--output", page), ("--output", &object)])?;
+    distinct_files::check(&[("--output", page), ("the JSON report", &object)])?;
     let warn_of_earlier = || warn_of_earlier(&[page, &object]);
     let board = Serial::connect(&arguments.port).inspect_err(|_| warn_of_earlier())?;
     let accepted = accept(board, tell).inspect_err(|_| warn_of_earlier());
@@ -74,5 +74,24 @@ fn tell(step: &StepReport) {
                 check.what, check.measured, check.expected
             ));
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_page_does_not_take_the_name_of_the_json_report() {
+        let arguments = AcceptArguments {
+            port: "/dev/null".into(),
+            output: "no-such-folder/a.json".into(),
+            json: false,
+        };
+        let error = run(&arguments).unwrap_err();
+        assert_eq!(
+            error.to_string(),
+            "--output and the JSON report both name `no-such-folder/a.json`: choose different files"
+        );
     }
 }
