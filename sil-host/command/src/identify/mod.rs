@@ -6,6 +6,7 @@ mod recorded;
 mod report;
 mod residuals;
 
+use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
@@ -20,6 +21,7 @@ use painleve_identify::parameters::Drawn;
 use painleve_plant::scenario::{Scenario, ScenarioError, built_in};
 use painleve_process::terminal::{self, warn};
 use painleve_shared::Posture;
+use painleve_study_core::options::number;
 use serde_json::json;
 
 use self::board_slides::BoardSlides;
@@ -31,6 +33,9 @@ use super::{CommandError, distinct_files, say};
 
 /// Standard deviation of a length that has been measured with a calliper, m.
 const MEASURED_M: f64 = 1e-4;
+
+/// Lengths that a scenario's `arm.link_length_m` may have, m.
+const LINK_LENGTH_M: RangeInclusive<f64> = 0.01..=10.0;
 
 /// A later distance from the line beyond this multiple of the one written down shows that the arm has changed.
 const CHANGED: f64 = 2.0;
@@ -62,7 +67,7 @@ pub struct IdentifyArguments {
     seed: Option<u64>,
     /// Length of link 1 from joint to joint, measured to a tenth of a millimetre, m; by default that of the scenario, to
     /// 0.6 %. A line has no scale: positions are as exact as this length.
-    #[arg(long, value_name = "M", value_parser = painleve_study_core::options::metres)]
+    #[arg(long, value_name = "M", value_parser = link_length_m)]
     link_1_m: Option<f64>,
     /// File for the scenario with the measured values.
     #[arg(long, value_name = "PATH", default_value = "out/identified.toml")]
@@ -73,6 +78,11 @@ pub struct IdentifyArguments {
     /// Print one JSON object on stdout instead of the text.
     #[arg(long)]
     json: bool,
+}
+
+/// Reads the length of a link, within the limits of a scenario's.
+fn link_length_m(text: &str) -> Result<f64, String> {
+    number(text, LINK_LENGTH_M, "metres")
 }
 
 fn mistakes() -> clap::builder::PossibleValuesParser {
@@ -227,4 +237,27 @@ fn report(
     say(report::text(found))?;
     say(terminal::readable(place))?;
     say(format_args!("written: {output} and {html}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use painleve_shared::ArmParameters;
+    use painleve_shared::settings::Settings;
+
+    #[test]
+    fn a_link_may_be_as_long_as_in_a_scenario() {
+        let mut settings = ArmParameters::<f64>::FIELDS.iter();
+        let range = settings
+            .find(|field| field.key == "link_length_m")
+            .unwrap()
+            .range
+            .unwrap();
+        assert_eq!(range.minimum..=range.maximum, LINK_LENGTH_M);
+        assert_eq!(link_length_m("9"), Ok(9.0));
+        assert_eq!(
+            link_length_m("0.001").unwrap_err(),
+            "give metres from 0.01 to 10"
+        );
+    }
 }
