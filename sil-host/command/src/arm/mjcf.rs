@@ -1,7 +1,9 @@
 //! The bodies of an MJCF file, in the configuration of its poses.
 
+use std::collections::HashMap;
+
 use nalgebra::{Isometry3, Quaternion, Rotation3, Translation3, Unit, UnitQuaternion, Vector3};
-use roxmltree::Node;
+use roxmltree::{Node, NodeId};
 
 use super::chain::{
     Body, Chain, Hinge, Mass, direction, elements, label, list, numbers, symmetric,
@@ -23,11 +25,56 @@ const HIDING: [&str; 5] = ["include", "replicate", "composite", "flexcomp", "att
 /// What the whole file agrees on.
 struct Reader<'a> {
     root: Node<'a, 'a>,
+    defaults: Defaults<'a>,
     /// Radians in a unit of angles.
     unit_rad: f64,
     euler_sequence: &'a str,
     /// Whether the masses of geoms count in bodies with and without `<inertial>`.
     counts_geoms: [bool; 2],
+}
+
+/// The `<default>`s of a file. They are looked up for every attribute, so searching the file each time would take the
+/// square of its length.
+struct Defaults<'a> {
+    /// The first one.
+    first: Option<Node<'a, 'a>>,
+    of_class: HashMap<&'a str, Node<'a, 'a>>,
+    /// The nearest `childclass` around an element.
+    class_around: HashMap<NodeId, &'a str>,
+}
+
+impl<'a> Defaults<'a> {
+    fn of(root: Node<'a, 'a>) -> Self {
+        let all = || {
+            root.descendants()
+                .filter(|node| node.has_tag_name("default"))
+        };
+        let with_class = all().filter_map(|node| Some((node.attribute("class")?, node)));
+        let mut class_around = HashMap::new();
+        // Each element comes after the one around it.
+        for node in root.descendants() {
+            let around = node.parent().and_then(|parent| {
+                let own = parent.attribute("childclass");
+                own.or_else(|| class_around.get(&parent.id()).copied())
+            });
+            class_around.extend(around.map(|class| (node.id(), class)));
+        }
+        Self {
+            first: all().next(),
+            // Of two with one name, the first counts.
+            of_class: with_class.rev().collect(),
+            class_around,
+        }
+    }
+
+    /// Returns the `<default>` of an element: that of its class, of the nearest `childclass` around it, or the first.
+    fn of_element(&self, node: Node<'a, 'a>) -> Option<Node<'a, 'a>> {
+        let around = || self.class_around.get(&node.id()).copied();
+        match node.attribute("class").or_else(around) {
+            Some(class) => self.of_class.get(class).copied(),
+            None => self.first,
+        }
+    }
 }
 
 /// Reads the bodies of `<mujoco>`.
@@ -62,6 +109,7 @@ pub fn chain<'a>(root: Node<'a, 'a>) -> Result<Chain, String> {
     }
     let reader = Reader {
         root,
+        defaults: Defaults::of(root),
         unit_rad: match setting("angle") {
             Some("radian") => 1.0,
             _ => 1_f64.to_radians(),
@@ -164,7 +212,7 @@ impl<'a> Reader<'a> {
         let own = node.attribute(name);
         own.or_else(|| {
             let tag = node.tag_name().name();
-            let mut class = self.class(node);
+            let mut class = self.defaults.of_element(node);
             while let Some(defaults) = class {
                 let element = defaults.children().find(|child| child.has_tag_name(tag));
                 if let Some(text) = element.and_then(|element| element.attribute(name)) {
@@ -176,23 +224,6 @@ impl<'a> Reader<'a> {
             }
             None
         })
-    }
-
-    /// Returns the `<default>` of an element: that of its class, of the nearest `childclass` around it, or the first.
-    fn class(&self, node: Node<'a, 'a>) -> Option<Node<'a, 'a>> {
-        let around = || {
-            node.ancestors()
-                .skip(1)
-                .find_map(|parent| parent.attribute("childclass"))
-        };
-        let mut defaults = self
-            .root
-            .descendants()
-            .filter(|node| node.has_tag_name("default"));
-        match node.attribute("class").or_else(around) {
-            Some(class) => defaults.find(|node| node.attribute("class") == Some(class)),
-            None => defaults.next(),
-        }
     }
 
     /// Returns the numbers of an attribute of an element, if it has it.

@@ -290,3 +290,16 @@ fn a_file_with_very_many_elements_is_refused() {
     let message = refusal(&format!("<mujoco><worldbody>{bodies}</worldbody></mujoco>"));
     assert!(message.contains("nodes limit"), "{message}");
 }
+
+#[test]
+fn deeply_nested_bodies_take_no_time_of_their_square() {
+    let depth = 1000;
+    let text = format!(
+        "<mujoco><worldbody>{}{}</worldbody></mujoco>",
+        r#"<body><geom size="0.1"/>"#.repeat(depth),
+        "</body>".repeat(depth)
+    );
+    let start = std::time::Instant::now();
+    refusal(&text);
+    assert!(start.elapsed().as_secs_f64() < 0.5);
+}
