@@ -207,24 +207,21 @@ impl<T: Real> Arm<T> {
         self.height_m
     }
 
-    /// Returns this arm with both links scaled, at the same masses, so that link 1 is `length_1_m` long. Rotors,
-    /// springs and the belt are unchanged. The length is not checked.
-    pub fn scaled_to(&self, length_1_m: T) -> Self {
-        let ratio = length_1_m / self.length_1_m;
+    /// Scales both links to those of the `nominal` arm, at the same masses, but with a link 1 that is `length_1_m` long.
+    /// Rotors, springs and the belt, which both arms share, stay as they are. The length is not checked.
+    pub fn scale_from(&mut self, nominal: &Self, length_1_m: T) {
+        let ratio = length_1_m / nominal.length_1_m;
         let square = ratio * ratio;
-        let rotors = self.rotor_1 + self.rotor_2;
-        Self {
-            length_1_m,
-            length_2_m: length_1_m * self.length_ratio,
-            inertia_1: (self.inertia_1 - rotors) * square + rotors,
-            inertia_2: (self.inertia_2 - self.rotor_2) * square + self.rotor_2,
-            inertia_coupling: self.inertia_coupling * square,
-            gravity_1_normal: self.gravity_1_normal * ratio,
-            gravity_1_tangential: self.gravity_1_tangential * ratio,
-            gravity_2_normal: self.gravity_2_normal * ratio,
-            gravity_2_tangential: self.gravity_2_tangential * ratio,
-            ..*self
-        }
+        let rotors = nominal.rotor_1 + nominal.rotor_2;
+        self.length_1_m = length_1_m;
+        self.length_2_m = length_1_m * nominal.length_ratio;
+        self.inertia_1 = (nominal.inertia_1 - rotors) * square + rotors;
+        self.inertia_2 = (nominal.inertia_2 - nominal.rotor_2) * square + nominal.rotor_2;
+        self.inertia_coupling = nominal.inertia_coupling * square;
+        self.gravity_1_normal = nominal.gravity_1_normal * ratio;
+        self.gravity_1_tangential = nominal.gravity_1_tangential * ratio;
+        self.gravity_2_normal = nominal.gravity_2_normal * ratio;
+        self.gravity_2_tangential = nominal.gravity_2_tangential * ratio;
     }
 
     /// Largest distance of the tip from the first joint, m: l1 + l2.
@@ -353,7 +350,9 @@ mod tests {
             ..parameters
         })
         .unwrap();
-        let changed = Arm::new(parameters).unwrap().scaled_to(scale * 0.25);
+        let nominal = Arm::new(parameters).unwrap();
+        let mut changed = nominal;
+        changed.scale_from(&nominal, scale * 0.25);
         let theta = LinkMotion::new(0.4, -0.3);
         let rates = LinkMotion::new(1.5, -2.0);
         let pose = Pose::new(&theta);

@@ -76,6 +76,7 @@ impl<L: Law> Stages<L> {
             calibrator: LengthCalibrator::new(&settings.calibration, &arm, Turn::COUNT * tick_s),
             joint_friction: JointFriction::new(configuration.arm.coulomb_friction_nm),
             force_cell,
+            force_range_n: force_cell.value(force_cell.maximum_counts),
         };
         Self {
             estimates,

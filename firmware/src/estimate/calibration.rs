@@ -74,7 +74,7 @@ impl LengthCalibrator {
         let length_m = height_m / self.mean;
         // Rejects non-finite lengths as well.
         if (length_m - nominal_m).abs() <= self.deviation_m {
-            *arm = self.nominal.scaled_to(length_m);
+            arm.scale_from(&self.nominal, length_m);
         }
     }
 
@@ -162,7 +162,9 @@ mod tests {
             calibration.update(gap_m(0.215, used_m) + error_m);
         }
         let [length_m, _] = calibration.arm.link_length_m();
-        assert_eq!(calibration.arm, nominal.scaled_to(length_m));
+        let mut scaled_once = nominal;
+        scaled_once.scale_from(&nominal, length_m);
+        assert_eq!(calibration.arm, scaled_once);
     }
 
     #[test]

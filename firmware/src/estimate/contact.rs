@@ -132,7 +132,8 @@ impl ContactDetector {
 
     /// Returns whether flight is certain; initially it is not.
     pub fn is_in_flight(&self) -> bool {
-        !self.contact && self.log_odds < -DECISION
+        // The tip does not touch then.
+        self.log_odds < -DECISION
     }
 
     /// Returns whether the contact decision is certain.

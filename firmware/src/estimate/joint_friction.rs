@@ -13,6 +13,8 @@ const COMPENSATED: f32 = 0.85;
 /// Model of both joints' Coulomb friction.
 #[derive(Clone, Copy, Debug)]
 pub struct JointFriction {
+    /// Whether there is nothing to compensate.
+    is_zero: bool,
     /// Compensated Coulomb friction, N·m.
     coulomb_nm: [f32; 2],
     /// Joint angles at the last tick, rad; absent before the first.
@@ -24,8 +26,10 @@ pub struct JointFriction {
 impl JointFriction {
     /// Makes the model for joints with this Coulomb friction, N·m.
     pub fn new(coulomb_friction_nm: [f32; 2]) -> Self {
+        let coulomb_nm = coulomb_friction_nm.map(|nm| COMPENSATED * nm);
         Self {
-            coulomb_nm: coulomb_friction_nm.map(|nm| COMPENSATED * nm),
+            is_zero: coulomb_nm == [0.0; 2],
+            coulomb_nm,
             angles_rad: None,
             torque_nm: JointTorque::zeros(),
         }
@@ -34,7 +38,7 @@ impl JointFriction {
     /// Returns whether there is nothing to compensate.
     #[inline]
     pub fn is_zero(&self) -> bool {
-        self.coulomb_nm == [0.0; 2]
+        self.is_zero
     }
 
     /// Returns the change of the friction in one tick, as a torque on the links, N·m, given the joint angles q', rad.

@@ -70,6 +70,8 @@ pub struct Estimators {
     pub(crate) friction_filter: FrictionEstimator,
     pub(crate) belt: BeltEstimator,
     pub(crate) force_cell: LinearConverter<f32>,
+    /// Largest reading of the force cell, N.
+    pub(crate) force_range_n: f32,
     pub(crate) response: ResponseEstimator,
     pub(crate) disturbance: DisturbanceEstimator,
     pub(crate) calibrator: LengthCalibrator,
@@ -169,8 +171,7 @@ impl Estimators {
     /// Returns whether the force cell is not at the end of its range, where it reads less than the actual force.
     #[inline]
     fn is_in_range(&self) -> bool {
-        let force_n = &self.contact.force_n;
-        let range_n = self.force_cell.value(self.force_cell.maximum_counts);
+        let (force_n, range_n) = (&self.contact.force_n, self.force_range_n);
         force_n.x.abs() < range_n && force_n.y.abs() < range_n
     }
 
