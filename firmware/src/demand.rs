@@ -27,7 +27,7 @@ impl<L: Law> TorqueDemand<L> {
         let settings = &configuration.settings;
         let law = settings.law.at_speed(speed);
         Self {
-            law_state: L::State::default(),
+            law_state: law.initial_state(),
             flight: None,
             law,
             recovery: settings.recovery,

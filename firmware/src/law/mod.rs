@@ -74,8 +74,14 @@ pub trait Law: Clone + Debug + Default + SettingValue {
         self.clone()
     }
 
-    /// Resets the law's state; called before the law's tick when the drive is armed and when the
-    /// tip lands.
+    /// Returns the state before the law's first tick. A law on a PC may allocate it here, once: the ticks must not, nor
+    /// may its [`reset`](Self::reset).
+    fn initial_state(&self) -> Self::State {
+        Self::State::default()
+    }
+
+    /// Resets the law's state, by default to that of a law that has not run; called before the law's tick when the drive
+    /// is armed and when the tip lands.
     fn reset(&self, state: &mut Self::State, input: &LawInput<'_>) {
         let _ = input;
         *state = Self::State::default();
@@ -158,6 +164,15 @@ macro_rules! law_set {
                     Self::Off => Self::Off,
                     $(Self::$law(law) => Self::$law($crate::law::Law::at_speed(law, factor)),)*
                 }
+            }
+
+            fn initial_state(&self) -> $states {
+                let mut states = $states::default();
+                match self {
+                    Self::Off => {}
+                    $(Self::$law(law) => states.$law = $crate::law::Law::initial_state(law),)*
+                }
+                states
             }
 
             // Out of line: few ticks reset a law, and its code there would take registers from every tick.

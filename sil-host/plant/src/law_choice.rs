@@ -100,6 +100,7 @@ trait AnyLaw: Debug + Send + Sync + erased_serde::Serialize {
     fn check(&self, bounds: &Bounds, error: &mut OutOfRange) -> Result<(), Refused>;
     fn is_on(&self) -> bool;
     fn at_speed(&self, factor: f32) -> LawChoice;
+    fn initial_state(&self) -> LawChoiceState;
     fn reset(&self, state: &mut LawChoiceState, input: &LawInput<'_>);
     fn tick(&self, state: &mut LawChoiceState, input: &LawInput<'_>) -> LawOutput;
 }
@@ -129,6 +130,10 @@ impl<L: ScenarioLaws> AnyLaw for L {
         LawChoice::new(Law::at_speed(self, factor))
     }
 
+    fn initial_state(&self) -> LawChoiceState {
+        LawChoiceState(Some(Box::new(Law::initial_state(self))))
+    }
+
     fn reset(&self, state: &mut LawChoiceState, input: &LawInput<'_>) {
         Law::reset(self, state.of::<L>(), input);
     }
@@ -138,7 +143,7 @@ impl<L: ScenarioLaws> AnyLaw for L {
     }
 }
 
-/// State of a [`LawChoice`]: the state of its law, allocated when the law is first reset.
+/// State of a [`LawChoice`]: the state of its law, allocated by [`Law::initial_state`].
 #[derive(Default)]
 pub struct LawChoiceState(Option<Box<dyn AnyState>>);
 
@@ -201,6 +206,10 @@ impl Law for LawChoice {
 
     fn at_speed(&self, factor: f32) -> Self {
         self.0.at_speed(factor)
+    }
+
+    fn initial_state(&self) -> LawChoiceState {
+        self.0.initial_state()
     }
 
     fn reset(&self, state: &mut LawChoiceState, input: &LawInput<'_>) {

@@ -137,7 +137,7 @@ fn no_output_replaces_an_input_or_another_output() {
             ["--csv", "s.toml"],
         ),
         (
-            &format!("{STUDY} {friction} --svg friction.svg"),
+            &format!("study robustness --runs 1 {friction} --svg friction.svg"),
             ["--svg", "friction.csv"],
         ),
         (

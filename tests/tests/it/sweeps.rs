@@ -324,7 +324,10 @@ fn a_table_changed_since_planning_is_detected() {
             "sweep-set",
             format!("study = 'robustness'\nruns = 2\n{set}"),
         ),
-        ("sweep-table", format!("{CAMPAIGN}scenario = 'mine.toml'\n")),
+        (
+            "sweep-table",
+            "study = 'sliding-range'\ncontroller = 'mine.toml'\n".to_owned(),
+        ),
     ] {
         let bench = Bench::new(name);
         let scenario = format!("[contact]\nkind = 'compliant'\n[effects]\n{effect}\n");

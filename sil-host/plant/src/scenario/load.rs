@@ -30,7 +30,7 @@ impl Scenario {
     /// [`ScenarioError`] in one sentence for the user, who knows nothing of the copy.
     pub fn load_standard_input(copy: &Path, overrides: &[String]) -> Result<Self, ScenarioError> {
         let origin = "standard input";
-        let table = read_file(copy, origin)?;
+        let table = read_file(copy, origin, "standard-input")?;
         let scenario = from_table(Some(origin), table)?.with_overrides(origin, overrides)?;
         scenario.checked_start(origin)
     }
@@ -132,10 +132,12 @@ fn read(name: &str) -> Result<Table, ScenarioError> {
     if !path.exists() {
         return Err(ScenarioError::Unknown { name: name.into() });
     }
-    read_file(&path, &origin)
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+    read_file(&path, &origin, &stem)
 }
 
-fn read_file(path: &Path, origin: &str) -> Result<Table, ScenarioError> {
+/// Reads a file whose scenario is called `name` unless it has a name itself.
+fn read_file(path: &Path, origin: &str, name: &str) -> Result<Table, ScenarioError> {
     let text = input_file::read(path).map_err(|source| ScenarioError::Unreadable {
         origin: origin.into(),
         source,
@@ -146,9 +148,9 @@ fn read_file(path: &Path, origin: &str) -> Result<Table, ScenarioError> {
             origin: origin.into(),
         });
     }
-    if let (false, Some(stem)) = (table.contains_key("name"), path.file_stem()) {
-        table.insert("name".into(), Value::String(stem.to_string_lossy().into()));
-    }
+    table
+        .entry("name")
+        .or_insert_with(|| Value::String(name.into()));
     Ok(table)
 }
 
@@ -403,6 +405,9 @@ mod tests {
             let message = error.to_string();
             assert!(message.starts_with(expected), "{message}");
         }
+        std::fs::write(copy.path(), "belt.friction = 0.5").unwrap();
+        let scenario = Scenario::load_standard_input(copy.path(), &[]).unwrap();
+        assert_eq!(scenario.name, "standard-input");
     }
 
     #[test]
