@@ -115,7 +115,7 @@ fn the_contact_never_pulls_and_settles_at_the_force_of_the_quiet_attractor() {
         plant.advance(f64::from(step) * 1e-3, &mut ()).unwrap();
         assert!(plant.contact_force_n().y >= 0.0);
     }
-    // docs/plant.md: elbow down, z_t = −0.175689 m, f_n = 0.441238 N.
+    // The quiet attractor, elbow down: z_t = −0.175689 m, f_n = 0.441238 N.
     assert!((plant.contact_force_n().y - 0.441_238).abs() < 2e-3);
     assert!((plant.snapshot().tip_t_m + 0.175_689).abs() < 1e-4);
 }
