@@ -209,6 +209,19 @@ pub enum InputError {
 }
 
 impl InputError {
+    /// Refuses the options of a rehearsal without one.
+    ///
+    /// # Errors
+    /// [`InputError::Needs`].
+    pub fn check_rehearsal(
+        rehearses: bool,
+        mistake: Option<&String>,
+        seed: Option<u64>,
+    ) -> Result<(), Self> {
+        let given = [("--mistake", mistake.is_some()), ("--seed", seed.is_some())];
+        Self::check_needed("--rehearse", rehearses, &given)
+    }
+
     /// Refuses options that are given without `needed`. clap's `requires` passes over one that conflicts with
     /// another given option.
     ///

@@ -76,13 +76,10 @@ fn mistakes() -> clap::builder::PossibleValuesParser {
 /// # Errors
 /// [`CommandError`] if the arm refuses, the board or a file fails, or the user interrupts.
 pub fn run(arguments: &CommissionArguments) -> Result<(), CommandError> {
-    InputError::check_needed(
-        "--rehearse",
+    InputError::check_rehearsal(
         arguments.rehearse,
-        &[
-            ("--mistake", arguments.mistake.is_some()),
-            ("--seed", arguments.seed.is_some()),
-        ],
+        arguments.mistake.as_ref(),
+        arguments.seed,
     )?;
     let mut scenario = Scenario::load(&arguments.scenario, &arguments.overrides)?;
     let tick_hz = scenario.run.tick_hz;

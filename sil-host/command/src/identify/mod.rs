@@ -95,13 +95,10 @@ fn mistakes() -> clap::builder::PossibleValuesParser {
 /// # Errors
 /// [`CommandError`] if the slides give no result, the board or a file fails, or the user interrupts.
 pub fn run(arguments: &IdentifyArguments) -> Result<(), CommandError> {
-    InputError::check_needed(
-        "--rehearse",
+    InputError::check_rehearsal(
         arguments.rehearse,
-        &[
-            ("--mistake", arguments.mistake.is_some()),
-            ("--seed", arguments.seed.is_some()),
-        ],
+        arguments.mistake.as_ref(),
+        arguments.seed,
     )?;
     let mut scenario = Scenario::load(&arguments.scenario, &arguments.overrides)?;
     let recorded: Result<Vec<_>, _> = arguments
