@@ -10,11 +10,12 @@ use painleve_shared::{Arm, JointTorque, LinkMotion, Slip};
 
 use crate::plant::{ContactMode, Plant, PlantError, Probe, Snapshot, State};
 
-use super::belt::{BeltProfile, BeltSettings};
+use super::belt::BeltSettings;
 use super::dop853::{Dop853Step, Tolerance};
 use super::impact::ImpactLaw;
 use super::motion::{Evaluation, Motion, StateTerms, theta};
 use super::motion_error::MotionError;
+use super::moving_belt::MovingBelt;
 use super::parameters::{InitialState, PlantParameters, SolverSettings};
 use super::probe::{ArmProbe, ArmStep};
 use super::step_budget::StepBudget;
@@ -25,6 +26,9 @@ use super::transition;
 /// rounding, s.
 const FIRST_ORDER_S: f64 = 1e-8;
 
+/// Largest number of corrections of an event's time.
+const MOST_CORRECTIONS: u32 = 3;
+
 /// Upper limit of events within the shortest relevant time; no real motion has as many.
 const MAXIMUM_EVENTS_AT_ONE_TIME: u32 = 1000;
 
@@ -33,7 +37,7 @@ const MAXIMUM_EVENTS_AT_ONE_TIME: u32 = 1000;
 pub struct ArmOnBelt {
     arm: Arm<f64>,
     friction: f64,
-    belt: BeltProfile,
+    belt: MovingBelt,
     impact: ImpactLaw,
     solver: SolverSettings,
     torque: TorqueSegment,
@@ -73,7 +77,7 @@ impl ArmOnBelt {
         let mut plant = Self {
             arm,
             friction: parameters.friction,
-            belt: parameters.belt.clone(),
+            belt: MovingBelt::new(&parameters.belt),
             impact: parameters.impact,
             solver: parameters.solver,
             torque: TorqueSegment::constant(JointTorque::zeros()),
@@ -100,7 +104,7 @@ impl ArmOnBelt {
         if gap_m < CONTACT_AT_START_M {
             let on_belt = motion.lowered_onto_belt(&initial);
             let velocity = motion.relative_velocity_m_s(0.0, &on_belt);
-            if velocity.y <= plant.solver.chatter_speed_m_s {
+            if velocity.y.abs() <= plant.solver.chatter_speed_m_s {
                 plant.state = motion.onto_belt(&on_belt);
                 plant.mode = ContactMode::slide(Slip::of(velocity.x));
                 plant.unsettled = true;
@@ -140,7 +144,7 @@ impl ArmOnBelt {
     pub fn motion(&self) -> Motion<'_> {
         Motion {
             arm: &self.arm,
-            belt: &self.belt,
+            belt: self.belt.profile(),
             friction: self.friction,
             torque: self.torque,
         }
@@ -154,9 +158,14 @@ impl ArmOnBelt {
 
     /// Gives the belt this friction and speed from now on.
     pub fn set_belt(&mut self, belt: &BeltSettings) {
-        self.stick_start = (self.time_s, self.motion().tip_t_m(&self.state));
         self.friction = belt.friction;
-        self.belt = belt.profile.clone();
+        self.belt.replace(self.time_s, &belt.profile);
+        self.restart_contact();
+    }
+
+    /// Lets the contact start anew, because the belt has changed.
+    fn restart_contact(&mut self) {
+        self.stick_start = (self.time_s, self.motion().tip_t_m(&self.state));
         self.unsettled = true;
         self.evaluation = None;
     }
@@ -197,7 +206,7 @@ impl ArmOnBelt {
     fn evaluate(&mut self) -> &Evaluation {
         let motion = Motion {
             arm: &self.arm,
-            belt: &self.belt,
+            belt: self.belt.profile(),
             friction: self.friction,
             torque: self.torque,
         };
@@ -223,6 +232,9 @@ impl ArmOnBelt {
             self.settle(probe)?;
             self.advance_smoothly(corner, probe)?;
             self.unsettled |= corner < until_s;
+            if self.belt.jump(self.time_s) {
+                self.restart_contact();
+            }
         }
         self.settle(probe)
     }
@@ -266,7 +278,7 @@ impl ArmOnBelt {
         let here = *self.evaluate();
         let motion = Motion {
             arm: &self.arm,
-            belt: &self.belt,
+            belt: self.belt.profile(),
             friction: self.friction,
             torque: self.torque,
         };
@@ -336,7 +348,7 @@ impl ArmOnBelt {
             // The interpolating polynomial that located the event is less accurate than a step.
             // Newton's method in time removes the gap that the step leaves, because moving the tip
             // onto the belt by force would change the energy.
-            for _ in 0..3 {
+            for taken in 1..=MOST_CORRECTIONS {
                 let size = *event_s - start_s;
                 self.step
                     .take(&derivative, start_s, &start, &here.slope, size, &tolerance);
@@ -349,7 +361,9 @@ impl ArmOnBelt {
                     let end_slope = derivative(*event_s, &self.step.end);
                     self.step.end += end_slope * correction;
                 }
-                *event_s += correction;
+                if exact || taken < MOST_CORRECTIONS {
+                    *event_s += correction;
+                }
                 if exact {
                     break;
                 }
@@ -397,7 +411,7 @@ impl ArmOnBelt {
             ContactMode::SlidePositive | ContactMode::SlideNegative => motion.onto_belt(state),
             ContactMode::Stick => {
                 let (since, anchor) = self.stick_start;
-                let tip = anchor + self.belt.displacement_m(since, t_s);
+                let tip = anchor + self.belt.profile().displacement_m(since, t_s);
                 motion.onto_stick(t_s, tip, state)
             }
         }

@@ -25,6 +25,7 @@ mod from_file;
 pub mod impact;
 pub mod motion;
 mod motion_error;
+mod moving_belt;
 mod parameters;
 mod probe;
 pub mod rosenbrock;

@@ -287,6 +287,44 @@ fn is_at_full_stretch(plant: &ArmOnBelt) -> bool {
     (plant.arm().reach_on_belt_m() - tip_t_m.abs()).abs() < 1e-7
 }
 
+/// Whether or not the step comes at the end of a stretch, the tip, which has slowed down, is dragged the other way by friction only.
+#[test]
+fn a_step_of_the_belts_speed_does_not_move_the_tip_at_once() {
+    for until_s in [1.0, 1.0004] {
+        let parameters = PlantParameters {
+            belt: BeltProfile::Step {
+                from_m_s: -0.4,
+                to_m_s: 0.4,
+                at_s: 1.0,
+            },
+            ..Default::default()
+        };
+        let mut drift = ConstraintDrift::default();
+        let mut plant = plant(&parameters, x0_d());
+        plant.advance(1.0 - 1e-6, &mut drift).unwrap();
+        assert_eq!(plant.mode(), ContactMode::SlidePositive);
+        let before = *plant.state();
+        plant.advance(until_s, &mut drift).unwrap();
+        plant.advance(1.0004, &mut drift).unwrap();
+        assert_eq!(plant.mode(), ContactMode::SlideNegative);
+        let change = (plant.state() - before).norm();
+        assert!(change < 0.2, "{until_s}: {change}");
+    }
+}
+
+#[test]
+fn a_tip_that_starts_downwards_on_the_belt_collides_with_it() {
+    let mut initial = x0_d();
+    initial[2] = 1.0;
+    let mut plant = plant(&PlantParameters::default(), initial);
+    let approach_m_s = plant.motion().relative_velocity_m_s(0.0, plant.state()).y;
+    assert!(approach_m_s < -0.03, "{approach_m_s}");
+    let mut statistics = Statistics::new(0.0);
+    plant.advance(1e-3, &mut statistics).unwrap();
+    // A tenth of the velocity remains after each.
+    assert!(statistics.impacts > 1, "{}", statistics.impacts);
+}
+
 /// Where p = 0 meets the limit of reach, μ = 0.488, the tip is thrown against its own links.
 #[test]
 fn an_arm_that_jams_at_full_stretch_is_reported_as_an_error() {

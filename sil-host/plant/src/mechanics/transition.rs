@@ -162,7 +162,7 @@ pub fn goes_on(
             return stays_above(CLEARANCE_M, h, start.gap, end.gap);
         }
         let inside_cone = motion.friction * end.force_n.y - end.force_n.x.abs() >= 0.0;
-        return inside_cone && end.b_m_s2 <= 0.0;
+        return inside_cone && end.b_m_s2 <= 0.0 && h <= SHORT_STEP_S;
     };
     let guarded_p = |at: &Evaluation| at.p_per_kg - P_GUARD * at.q22_per_kg;
     let side = side_of(guarded_p(start));

@@ -7,6 +7,7 @@ use super::contact::CompliantContact;
 use crate::mechanics::belt::BeltProfile;
 use crate::mechanics::effects::Effects;
 use crate::mechanics::effects::friction::FrictionChange;
+use crate::mechanics::moving_belt::MovingBelt;
 use crate::mechanics::rosenbrock::Equations;
 use crate::mechanics::torque::TorqueSegment;
 
@@ -27,8 +28,8 @@ pub const FULL: usize = 13;
 pub struct CompliantMotion<'a> {
     /// The arm.
     pub arm: &'a Arm<f64>,
-    /// The belt's speed.
-    pub belt: &'a BeltProfile,
+    /// The belt.
+    pub belt: &'a MovingBelt,
     /// Friction coefficient μ before any change.
     pub friction: f64,
     /// The contact's law.
@@ -71,7 +72,7 @@ impl CompliantMotion<'_> {
         } else {
             (0.0, 0.0)
         };
-        let slip_m_s = velocity_m_s.x - self.belt.speed_m_s(t_s);
+        let slip_m_s = velocity_m_s.x - self.belt.profile().speed_m_s(t_s);
         let mut closing_m_s = hanging_m_s - velocity_m_s.y;
         let mut surface_m = hanging_m;
         let surface = &self.effects.surface;
@@ -104,7 +105,7 @@ impl CompliantMotion<'_> {
     /// Returns the position on the belt, in a frame that moves with it, under a tip at `tip_t_m`,
     /// m.
     fn along_belt_m(&self, t_s: f64, tip_t_m: f64) -> f64 {
-        tip_t_m - self.belt.displacement_m(0.0, t_s)
+        tip_t_m - self.belt.displacement_m(t_s)
     }
 
     /// Returns the friction coefficient μ at a time and a tip position along the belt, m.
@@ -181,7 +182,7 @@ impl<const N: usize> Equations<N> for CompliantMotion<'_> {
     }
 
     fn is_autonomous(&self) -> bool {
-        let still = matches!(self.belt, BeltProfile::Constant { .. });
+        let still = matches!(self.belt.profile(), BeltProfile::Constant { .. });
         let effects = self.effects;
         still
             && self.torque.is_constant()

@@ -22,9 +22,10 @@ use equations::{CompliantMotion, FULL, PLAIN, WITH_DRIVES};
 use step::CompliantStep;
 
 use super::arm_on_belt::{CONTACT_AT_START_M, INSIDE_AT_START_M};
-use super::belt::{BeltProfile, BeltSettings};
+use super::belt::BeltSettings;
 use super::effects::Effects;
 use super::effects::gear::EncoderSide;
+use super::moving_belt::MovingBelt;
 use super::rosenbrock::Linearised;
 use super::step_budget::StepBudget;
 use super::torque::TorqueSegment;
@@ -42,7 +43,7 @@ pub struct CompliantArmOnBelt {
     arm: Arm<f64>,
     /// The arm with the payload that it will pick up.
     loaded_arm: Option<Box<Arm<f64>>>,
-    belt: BeltProfile,
+    belt: MovingBelt,
     friction: f64,
     contact: CompliantContact,
     effects: Effects,
@@ -63,7 +64,7 @@ impl CompliantArmOnBelt {
     /// Gives the belt this friction and speed from now on.
     pub fn set_belt(&mut self, belt: &BeltSettings) {
         self.friction = belt.friction;
-        self.belt = belt.profile.clone();
+        self.belt.replace(self.time_s, &belt.profile);
     }
 
     /// Creates a plant at time zero with zero torque. A tip at most 0.1 mm above the belt or 1 mm
@@ -93,7 +94,7 @@ impl CompliantArmOnBelt {
         let mut plant = Self {
             arm,
             loaded_arm: effects.payload.is_on().then(|| Box::new(loaded)),
-            belt: parameters.belt.clone(),
+            belt: MovingBelt::new(&parameters.belt),
             friction: parameters.friction,
             contact: CompliantContact::new(contact),
             effects: effects.clone(),
@@ -163,6 +164,7 @@ impl CompliantArmOnBelt {
             } else {
                 self.advance_smoothly::<PLAIN>(corner, probe)?;
             }
+            self.belt.jump(self.time_s);
         }
         Ok(())
     }

@@ -45,7 +45,7 @@ impl<'a> CompliantMotion<'a> {
     pub(super) fn rigid(&self, t_s: f64, tip_t_m: f64) -> Motion<'a> {
         Motion {
             arm: self.arm,
-            belt: self.belt,
+            belt: self.belt.profile(),
             friction: self.friction_at(t_s, tip_t_m),
             torque: self.torque,
         }

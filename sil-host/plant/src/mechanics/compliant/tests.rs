@@ -2,8 +2,10 @@ use painleve_shared::Pose;
 
 use super::*;
 use crate::mechanics::ArmOnBelt;
+use crate::mechanics::belt::BeltProfile;
 use crate::mechanics::effects::payload::Payload;
 use crate::mechanics::effects::push::Push;
+use crate::mechanics::effects::surface::Surface;
 
 /// The paper's x0,a, which is inconsistent at the start; x0,d lies on the belt.
 const INCONSISTENT_DEG: (f64, f64) = (32.0, 18.27);
@@ -281,6 +283,27 @@ fn a_stiff_hanging_belt_is_a_belt_on_a_firm_bed_with_and_without_drives() {
     assert!((firm - hanging).norm() < 1e-3);
     let with_drives = end(on_hanging_belt(1e9, 1e-9));
     assert!((hanging - with_drives).norm() < 1e-3);
+}
+
+#[test]
+fn a_belt_that_changes_its_speed_keeps_its_surface_where_it_is() {
+    let effects = Effects {
+        surface: Surface {
+            waviness_m: 1e-4,
+            ..Default::default()
+        },
+        ..Default::default()
+    };
+    let mut plant = compliant(&contact(1e5, 1e-6), &effects, ON_BELT_DEG);
+    plant.advance(3.0, &mut ()).unwrap();
+    let before_n = plant.contact_force_n();
+    let profile = BeltProfile::Constant { speed_m_s: -0.401 };
+    plant.set_belt(&BeltSettings {
+        profile,
+        ..Default::default()
+    });
+    let change_n = (plant.contact_force_n() - before_n).norm();
+    assert!(change_n < 0.05, "{change_n} N of {before_n}");
 }
 
 #[test]
