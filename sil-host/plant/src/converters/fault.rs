@@ -144,7 +144,7 @@ pub struct FaultyChannel {
     full_scale: i64,
     generator: Pcg64,
     /// Value of a stuck or slow channel, or of a channel before its fault.
-    held: i64,
+    held: Option<i64>,
     /// Time of the next change of a slow channel or of the next draw of an intermittent one, s.
     next_s: f64,
     is_off: bool,
@@ -166,7 +166,7 @@ impl FaultyChannel {
             fault: *fault,
             full_scale,
             generator: Pcg64::seed_from_u64(seed ^ stream),
-            held: 0,
+            held: None,
             next_s: f64::NEG_INFINITY,
             is_off: false,
             history: VecDeque::with_capacity(delay_ticks + 1),
@@ -185,22 +185,22 @@ impl FaultyChannel {
             self.history.pop_front();
         }
         if time_s < from_s || time_s >= until_s {
-            self.held = counts;
+            self.held = Some(counts);
             return counts;
         }
         match self.fault {
             ChannelFault::None => counts,
             ChannelFault::Off { .. } => 0,
-            ChannelFault::Stuck { .. } => self.held,
+            ChannelFault::Stuck { .. } => *self.held.get_or_insert(counts),
             ChannelFault::Wrong { error, .. } => {
                 counts + (error * self.full_scale as f64).round() as i64
             }
             ChannelFault::Slow { period_s, .. } => {
                 if time_s >= self.next_s {
                     self.next_s = self.next_s.max(from_s) + period_s;
-                    self.held = counts;
+                    self.held = Some(counts);
                 }
-                self.held
+                self.held.unwrap_or(counts)
             }
             ChannelFault::Delayed { .. } => self.history.front().copied().unwrap_or(counts),
             ChannelFault::Intermittent {
@@ -278,6 +278,13 @@ mod tests {
         ] {
             assert_eq!(passed(fault), with(during), "{fault:?}");
         }
+    }
+
+    #[test]
+    fn a_channel_that_is_stuck_from_the_start_keeps_its_first_value() {
+        let (from_s, until_s) = (0.0, 1.0);
+        let stuck = passed(ChannelFault::Stuck { from_s, until_s });
+        assert!(stuck.iter().all(|counts| *counts == 100), "{stuck:?}");
     }
 
     #[test]
