@@ -374,6 +374,7 @@ mod tests {
         let message = |text| load(text).unwrap_err().to_string();
         assert!(message("").contains("is empty"));
         assert!(message("[belt\n").contains("line 1"));
+        assert!(message("[belt]\nfriction = 0.5\nfriction = 0.6\n").contains("line 3"));
         assert!(message("[belt]\nspeed = 1\n").contains("speed"));
         assert!(message("[belt]\nfriction = \"high\"\n").contains("belt.friction"));
         let missing = |name| Scenario::load(name, &[]).unwrap_err().to_string();

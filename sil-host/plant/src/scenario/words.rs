@@ -18,7 +18,7 @@ impl TomlError {
     pub fn new(source: toml::de::Error, text: &str) -> Self {
         let line = source
             .span()
-            .map(|span| text[..span.start.min(text.len())].lines().count().max(1));
+            .map(|span| 1 + text[..span.start.min(text.len())].matches('\n').count());
         Self { line, source }
     }
 }
