@@ -303,11 +303,12 @@ impl<H: ControllerHost, P: Plant> ClosedLoop<H, P> {
             statistics: &mut self.statistics,
             monitor: &mut *monitor,
         };
+        let tick = self.simulation.ticks();
         self.simulation.advance(frame.as_ref(), &mut probe)?;
         self.smoothness
             .add(frame.as_ref(), self.statistics.normal_force_n);
         if self.simulation.drive_watchdog_has_tripped() && self.drive_watchdog_tick.is_none() {
-            self.drive_watchdog_tick = Some(self.simulation.ticks());
+            self.drive_watchdog_tick = Some(tick);
         }
         monitor.tick()
     }
