@@ -1,8 +1,8 @@
 //! The list of studies, for the command line, sweeps and the page of figures.
 //!
 //! [`core`](painleve_study_core) says what a study is, [`paper`](painleve_study_paper) computes the paper's figures,
-//! [`quality`](painleve_study_quality) how well the controller works, and `sweep` computes any of them in shards, on many
-//! machines.
+//! [`quality`](painleve_study_quality) how well the controller works, and `sweep` computes in shards, on
+//! many machines, those whose rows are lines of a table.
 //!
 //! Each study is a folder: `mod.rs` holds its settings and rows, `options.rs` parses the settings
 //! from the command line, `outcome.rs` collects the rows, `figure.rs` draws them, and `page.rs`

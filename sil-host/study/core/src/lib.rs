@@ -147,15 +147,35 @@ pub fn combinations(counts: &[usize]) -> usize {
         .fold(1, |product: usize, &count| product.saturating_mul(count))
 }
 
+/// Returns the place of a combination among the values of each option, of which there are `counts`; the first option's value
+/// changes fastest.
+pub fn places<const N: usize>(index: usize, counts: [usize; N]) -> [usize; N] {
+    let mut rest = index;
+    counts.map(|count| {
+        let place = rest % count;
+        rest /= count;
+        place
+    })
+}
+
+/// Checks that a study has no more rows than can be computed.
+///
+/// # Errors
+/// [`StudyError::TooManyRows`].
+pub fn check_rows<S: Study>(study: &S) -> Result<(), StudyError> {
+    match study.len() {
+        ..=MOST_ROWS => Ok(()),
+        rows => Err(StudyError::TooManyRows(rows)),
+    }
+}
+
 /// Computes all rows in order on the threads of the current rayon pool; `done` is
 /// called after each row, and no further row begins once it has panicked.
 ///
 /// # Errors
 /// [`StudyError::TooManyRows`], or the error of the first row that fails, whatever the number of threads.
 pub fn rows<S: Study>(study: &S, done: impl Fn() + Sync) -> Result<Vec<S::Row>, StudyError> {
-    if study.len() > MOST_ROWS {
-        return Err(StudyError::TooManyRows(study.len()));
-    }
+    check_rows(study)?;
     let rows: Vec<Result<S::Row, StudyError>> = (0..study.len())
         .into_par_iter()
         // The cost of rows varies widely.

@@ -18,6 +18,8 @@ pub struct Trial<P = BuiltInPlant> {
     simulation: Simulation<P>,
     controller: Controller,
     answer: ActuatorFrame,
+    /// Whether it answers the last tick, whose frame was not lost.
+    is_answered: bool,
 }
 
 impl Trial {
@@ -42,6 +44,7 @@ impl<P: Plant> Trial<P> {
             simulation: Simulation::of(plant, scenario)?,
             controller: Controller::new(&scenario.controller_configuration())?,
             answer: ActuatorFrame::default(),
+            is_answered: false,
         })
     }
 
@@ -51,11 +54,11 @@ impl<P: Plant> Trial<P> {
     /// [`PlantError`] if the plant cannot continue.
     pub fn tick(&mut self, probe: &mut dyn Probe) -> Result<(), PlantError> {
         let sensor = self.simulation.sample(probe)?;
-        let arrives = !self.simulation.sensor_frame_is_lost();
-        if arrives {
+        self.is_answered = !self.simulation.sensor_frame_is_lost();
+        if self.is_answered {
             self.answer = self.controller.tick(&sensor);
         }
-        let answer = arrives.then_some(&self.answer);
+        let answer = self.is_answered.then_some(&self.answer);
         self.simulation.advance(answer, probe)
     }
 
@@ -87,6 +90,11 @@ impl<P: Plant> Trial<P> {
     /// Returns the normal force on the tip, N.
     pub fn normal_force_n(&self) -> f64 {
         self.simulation.plant().snapshot().normal_force_n
+    }
+
+    /// Returns the answer to the last tick; `None` if its frame was lost.
+    pub fn new_answer(&self) -> Option<&ActuatorFrame> {
+        self.is_answered.then_some(&self.answer)
     }
 
     /// Returns the last answer of the controller.

@@ -54,7 +54,9 @@ pub enum ManifestError {
         ours: String,
     },
     /// The number of shards does not suit the rows.
-    #[error("has been changed: it has more shards than rows, or none")]
+    #[error(
+        "has been changed: it has no shards, more shards than rows, or more of either than a sweep can have"
+    )]
     ShardCount,
     /// The campaign or a file has been changed.
     #[error("it {}has been changed since the sweep was planned; plan it again elsewhere", or_files(.0))]
@@ -201,7 +203,8 @@ impl Manifest {
             }
         }
         let manifest: Self = table.try_into().map_err(syntax)?;
-        if manifest.shards == 0 || manifest.shards > manifest.rows {
+        let most = manifest.rows.min(MOST_SHARDS);
+        if manifest.rows > MOST_ROWS || !(1..=most).contains(&manifest.shards) {
             return Err(ManifestError::ShardCount);
         }
         Ok(manifest)

@@ -23,7 +23,7 @@ use painleve_study_core::initial::Initial;
 use painleve_study_core::loop_study::{LoopStudy, MakePlant};
 use painleve_study_core::tabular::Tabular;
 use painleve_study_core::trial::Trial;
-use painleve_study_core::{Study, StudyError};
+use painleve_study_core::{Study, StudyError, check_rows, combinations, places};
 use serde::Serialize;
 
 use crate::attractor::Attractor;
@@ -96,25 +96,30 @@ impl ClosedLoopBifurcation {
     /// # Errors
     /// [`StudyError`] of the first invalid cell.
     pub fn check(&self) -> Result<(), StudyError> {
+        check_rows(self)?;
         for index in 0..self.len() {
             Trial::new(&self.scenario(index)?.1)?;
         }
         Ok(())
     }
 
+    /// Returns the numbers of values, of which the first changes fastest from row to row.
+    fn counts(&self) -> [usize; 5] {
+        [
+            self.initial.len(),
+            self.v_belt_m_s.len(),
+            self.mu.len(),
+            self.converters.len(),
+            self.controllers.len(),
+        ]
+    }
+
     /// Returns the parameters of a row, and its scenario.
     fn scenario(&self, index: usize) -> Result<(LoopCell<'_>, Scenario), StudyError> {
-        let mut rest = index;
-        let mut place = |count: usize| {
-            let place = rest % count;
-            rest /= count;
-            place
-        };
-        let initial = self.initial[place(self.initial.len())];
-        let v_belt_m_s = self.v_belt_m_s[place(self.v_belt_m_s.len())];
-        let mu = self.mu[place(self.mu.len())];
-        let converters = self.converters[place(self.converters.len())];
-        let controller = &self.controllers[place(self.controllers.len())];
+        let [initial, v_belt, mu, converters, controller] = places(index, self.counts());
+        let (initial, v_belt_m_s, mu) =
+            (self.initial[initial], self.v_belt_m_s[v_belt], self.mu[mu]);
+        let (converters, controller) = (self.converters[converters], &self.controllers[controller]);
 
         let mut overrides = self.overrides.clone();
         overrides.push(format!("belt.friction={mu}"));
@@ -168,13 +173,7 @@ impl Study for ClosedLoopBifurcation {
     type Row = Row;
 
     fn len(&self) -> usize {
-        painleve_study_core::combinations(&[
-            self.controllers.len(),
-            self.converters.len(),
-            self.mu.len(),
-            self.v_belt_m_s.len(),
-            self.initial.len(),
-        ])
+        combinations(&self.counts())
     }
 
     fn row(&self, index: usize) -> Result<Row, StudyError> {

@@ -23,7 +23,7 @@ use painleve_study_core::case::{self, ControllerChoice, ConverterChoice, Referen
 use painleve_study_core::loop_study::{LoopStudy, MakePlant};
 use painleve_study_core::tabular::Tabular;
 use painleve_study_core::trial::Trial;
-use painleve_study_core::{Study, StudyError};
+use painleve_study_core::{Study, StudyError, check_rows, combinations, places};
 use rayon::prelude::*;
 use serde::Serialize;
 
@@ -143,6 +143,7 @@ impl SlidingRange {
     /// # Errors
     /// [`StudyError`] of the first invalid case.
     pub fn check(&self) -> Result<(), StudyError> {
+        check_rows(self)?;
         for index in 0..self.len() {
             let case = self.case(index)?;
             Trial::new(&case.scenario)?;
@@ -150,18 +151,25 @@ impl SlidingRange {
         Ok(())
     }
 
+    /// Returns the numbers of values, of which the first changes fastest from row to row.
+    fn counts(&self) -> [usize; 5] {
+        [
+            self.references.len(),
+            self.mu.len(),
+            self.postures.len(),
+            self.converters.len(),
+            self.controllers.len(),
+        ]
+    }
+
     fn case(&self, index: usize) -> Result<Case<'_>, StudyError> {
-        let mut rest = index;
-        let mut place = |count: usize| {
-            let place = rest % count;
-            rest /= count;
-            place
-        };
-        let reference = self.references[place(self.references.len())];
-        let mu = self.mu[place(self.mu.len())];
-        let posture = self.postures[place(self.postures.len())];
-        let converters = self.converters[place(self.converters.len())];
-        let controller = &self.controllers[place(self.controllers.len())];
+        let [reference, mu, posture, converters, controller] = places(index, self.counts());
+        let (reference, mu, posture) = (
+            self.references[reference],
+            self.mu[mu],
+            self.postures[posture],
+        );
+        let (converters, controller) = (self.converters[converters], &self.controllers[controller]);
         let mut overrides = self.overrides.clone();
         overrides.push(format!("belt.friction={mu}"));
         let scenario = case::scenario(controller, posture, converters, &overrides)?;
@@ -181,11 +189,7 @@ impl Study for SlidingRange {
     type Row = Row;
 
     fn len(&self) -> usize {
-        self.controllers.len()
-            * self.converters.len()
-            * self.postures.len()
-            * self.mu.len()
-            * self.references.len()
+        combinations(&self.counts())
     }
 
     fn row(&self, index: usize) -> Result<Row, StudyError> {
@@ -264,7 +268,7 @@ impl Case<'_> {
 
     /// Returns the end of the interval with p > 0 around the start.
     fn limit_m(&self, start_m: f64) -> Result<f64, StudyError> {
-        let arm = Arm::new(self.scenario.arm)?;
+        let arm = Arm::new(self.scenario.moving_arm())?;
         let line = BeltLine::new(&arm, self.posture);
         // The tip starts at rest.
         let slip = Slip::of(-self.scenario.belt.profile.speed_m_s(0.0));

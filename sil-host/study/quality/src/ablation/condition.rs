@@ -23,7 +23,7 @@ pub enum Condition {
     Hanging,
     /// A known arm on patches of μ ± 0.1.
     Patches,
-    /// A known arm with all effects of a rig at half of their typical level.
+    /// A known arm with the effects of `everything` at half of their typical level.
     Half,
     /// An arm that bounces until the controller is switched on.
     Capture,

@@ -51,7 +51,14 @@ impl StudyOptions for Options {
     }
 }
 
-/// Returns what was chosen, or all if nothing was.
-fn or_all<T: Copy>(chosen: &[T], all: &[T]) -> Vec<T> {
-    if chosen.is_empty() { all } else { chosen }.to_vec()
+/// Returns what was chosen, each once, or all if nothing was.
+fn or_all<T: Copy + PartialEq>(chosen: &[T], all: &[T]) -> Vec<T> {
+    let chosen = if chosen.is_empty() { all } else { chosen };
+    let mut once = Vec::new();
+    for it in chosen {
+        if !once.contains(it) {
+            once.push(*it);
+        }
+    }
+    once
 }

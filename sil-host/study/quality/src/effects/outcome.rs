@@ -49,9 +49,9 @@ pub struct Series {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Fall {
-    /// Already below without the effect, or at the lowest level of an effect without a smaller one.
+    /// Already below without the effect.
     Before,
-    /// Between two levels, interpolated.
+    /// Between two levels, interpolated; at the lowest level, if it is below there.
     At(f64),
     /// Not at the levels of the study.
     Beyond,

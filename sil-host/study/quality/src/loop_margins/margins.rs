@@ -6,7 +6,7 @@ use nalgebra::Complex;
 use serde::Serialize;
 
 pub(super) fn decibels(gain: f64) -> f64 {
-    20.0 * gain.log10()
+    20.0 * libm::log10(gain)
 }
 
 /// Returns |value|.
@@ -52,7 +52,7 @@ impl Margins {
     pub fn of(open_loop: impl Fn(f64) -> Complex<f64>, tick_hz: f64) -> Self {
         let ratio = 0.5 * tick_hz / LOWEST_HZ;
         let hz = (0..FREQUENCIES)
-            .map(|number| LOWEST_HZ * ratio.powf(number as f64 / (FREQUENCIES - 1) as f64));
+            .map(|number| LOWEST_HZ * libm::pow(ratio, number as f64 / (FREQUENCIES - 1) as f64));
         let points: Vec<(f64, Complex<f64>)> = hz.map(|hz| (hz, open_loop(hz))).collect();
         let mut margins = Self {
             crossover_hz: None,
@@ -68,7 +68,7 @@ impl Margins {
         for pair in points.windows(2) {
             let [(low_hz, low), (high_hz, high)] = [pair[0], pair[1]];
             if (size(low) > 1.0) != (size(high) > 1.0) {
-                let share = size(low).ln() / (size(low) / size(high)).ln();
+                let share = libm::log(size(low)) / libm::log(size(low) / size(high));
                 let at_hz = low_hz + share * (high_hz - low_hz);
                 margins.take_crossover(at_hz, low + (high - low) * share, size(low) > 1.0);
             }

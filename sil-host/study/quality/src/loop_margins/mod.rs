@@ -34,7 +34,7 @@ use serde::Serialize;
 use painleve_study_core::belt_line;
 use painleve_study_core::case::{self, ControllerChoice, ConverterChoice};
 use painleve_study_core::tabular::Tabular;
-use painleve_study_core::{Study, StudyError};
+use painleve_study_core::{Study, StudyError, check_rows};
 
 use at_rest::AtRest;
 pub use margins::Margins;
@@ -160,6 +160,7 @@ impl LoopMargins {
     /// # Errors
     /// [`StudyError`] of the first invalid one.
     pub fn check(&self) -> Result<(), StudyError> {
+        check_rows(self)?;
         for index in 0..self.len() {
             AtRest::start(&self.scenario(index, &[])?)?;
         }

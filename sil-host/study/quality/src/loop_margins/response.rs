@@ -39,7 +39,7 @@ const IDLE: f64 = 1e-6;
 pub(super) fn frequencies_hz(count: usize, tick_hz: f64) -> Vec<f64> {
     let ratio = HIGHEST * tick_hz / LOWEST_HZ;
     let steps = count.saturating_sub(1).max(1) as f64;
-    let exact = (0..count).map(|number| LOWEST_HZ * ratio.powf(number as f64 / steps));
+    let exact = (0..count).map(|number| LOWEST_HZ * libm::pow(ratio, number as f64 / steps));
     exact.map(|hz| (hz * SINE_S).round() / SINE_S).collect()
 }
 

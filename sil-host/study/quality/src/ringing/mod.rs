@@ -19,7 +19,7 @@ use painleve_shared::{Arm, Posture, Slip};
 use painleve_study_core::belt_line::{BeltLine, positive_stretches};
 use painleve_study_core::tabular::Tabular;
 use painleve_study_core::trial::Trial;
-use painleve_study_core::{Study, StudyError};
+use painleve_study_core::{Study, StudyError, check_rows};
 use serde::Serialize;
 
 pub use limit::ContactAtPlace;
@@ -79,11 +79,12 @@ impl Ringing {
     /// # Errors
     /// [`StudyError`] of the first invalid one.
     pub fn check(&self) -> Result<(), StudyError> {
+        check_rows(self)?;
         for index in 0..self.len() {
             let (damping_ns_m, rate_per_s) = self.at(index);
             Trial::new(&self.scenario(damping_ns_m, rate_per_s, 0.0)?)?;
         }
-        self.way(&Arm::new(self.base()?.arm)?, &self.base()?)?;
+        self.way(&Arm::new(self.base()?.moving_arm())?, &self.base()?)?;
         Ok(())
     }
 
@@ -106,7 +107,7 @@ impl Ringing {
         rate_per_s: f64,
         tip_t_m: f64,
     ) -> Result<Scenario, StudyError> {
-        let arm = Arm::new(self.base()?.arm)?;
+        let arm = Arm::new(self.base()?.moving_arm())?;
         let line = BeltLine::new(&arm, POSTURE);
         let tau = line.tau(tip_t_m).ok_or_else(|| StudyError::OutOfReach {
             tip_t_m,

@@ -65,13 +65,13 @@ impl Range {
         match share {
             ..=0.0 => self.from,
             1.0.. => self.to,
-            _ => self.from * (self.to / self.from).powf(share),
+            _ => self.from * libm::pow(self.to / self.from, share),
         }
     }
 
     /// Returns the share of the range at which a value is.
     fn share(&self, value: f64) -> f64 {
-        (value / self.from).ln() / (self.to / self.from).ln()
+        libm::log(value / self.from) / libm::log(self.to / self.from)
     }
 }
 
@@ -89,7 +89,7 @@ pub(super) fn values(ranges: &[Range], trials: &[Trial], index: usize, seed: u64
     let mut best: Vec<&Trial> = known.iter().collect();
     best.sort_by(|one, other| one.cost.total_cmp(&other.cost));
     let parent = best[index / ANYWHERE % PARENTS.min(best.len())];
-    let distance = (FAR * (index as f64 / BATCH as f64).powf(SHRINKING)).max(NEAR);
+    let distance = (FAR * libm::pow(index as f64 / BATCH as f64, SHRINKING)).max(NEAR);
     let around = |(range, value): (&Range, &f64)| {
         // The sum of three uniform numbers is nearly normal, with a deviation of 1.
         let step: f64 = (0..3).map(|_| generator.random_range(-1.0..1.0)).sum();
