@@ -16,8 +16,9 @@ pub(super) const FAST_S: f64 = 8.0;
 /// Starts of that disturbance on successive ticks, which the response is averaged over: several for each turn of the
 /// controller's slow work.
 const STARTS: usize = 8;
-/// Size of the disturbance of one tick, in that of a sine: it lasts a thousandth of a second.
-const TICK_SIZE: f64 = 8.0;
+/// Size of the disturbance of one tick, in that of a sine: it lasts a thousandth of a second. With a quarter of it, counts blur
+/// the response: near the arm's resonance, where the paper's PID has a gain of 60 dB, it is 14 % off, with this 2 %.
+const TICK_SIZE: f64 = 32.0;
 /// What the response of a stable loop still contains after some ticks is slow: from this tick on it is averaged over this
 /// part of the time since the disturbance, which removes the counts of the encoders.
 const SMOOTH_FROM: usize = 128;
