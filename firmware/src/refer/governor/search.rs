@@ -58,12 +58,14 @@ impl Search {
     pub(super) fn point(&self, reach_m: f32) -> f32 {
         let step_m = 2.0 * reach_m / STEPS_OVER_REACH;
         let point = match self.stage {
-            // Alternate between the side towards the middle of the belt and the other side.
+            Stage::Entering { refused: 0, .. } => self.inside_m,
+            // Places a whole number of steps from the middle, which do not move with the tip: where none is admissible, the best
+            // one stays the best. In turn outwards and inwards.
             Stage::Entering { refused, .. } => {
-                let away_m = step_m * refused.div_ceil(2) as f32;
+                let steps = (self.inside_m / step_m).truncate_to_i32();
+                let away = (refused / 2).cast_signed() * if self.inside_m < 0.0 { -1 } else { 1 };
                 let inwards = refused % 2 == 1;
-                let outwards_m = away_m.copysign(self.inside_m);
-                self.inside_m + if inwards { -outwards_m } else { outwards_m }
+                step_m * (steps + if inwards { -away } else { away }) as f32
             }
             Stage::Marching => self.inside_m + self.direction * step_m,
             Stage::Halving { beyond_m, .. } => 0.5 * (self.inside_m + beyond_m),

@@ -166,6 +166,30 @@ fn without_an_admissible_place_nearby_the_tip_is_led_to_the_best_one_and_not_acr
     assert!((tip_t_m + 0.1).abs() < 0.015, "{tip_t_m}");
 }
 
+/// A tip in the air swings about the place to which it is led: the place must not swing with it.
+#[test]
+fn the_best_place_is_the_same_for_every_tip_or_the_tips_own() {
+    let settings = GovernorSettings {
+        p_per_kg: 6.0,
+        ..Default::default()
+    };
+    let friction = known(0.79, Slip::Negative);
+    let led = (0..80)
+        .map(|step| -0.12 + 5e-4 * step as f32)
+        .filter_map(|tip_t_m| {
+            let mut governor = with(&configuration(&settings));
+            for _ in 0..30 {
+                governor.search(&arm(), Posture::ElbowDown, tip_t_m, &friction, 0.0);
+            }
+            let (lower_m, upper_m) = governor.edges_m();
+            assert_eq!(lower_m, upper_m, "{tip_t_m}");
+            (upper_m != tip_t_m).then_some(upper_m)
+        });
+    let led: std::vec::Vec<f32> = led.collect();
+    assert!(led.len() > 40, "{led:?}");
+    assert!(led.iter().all(|place_m| *place_m == led[0]), "{led:?}");
+}
+
 /// Follows the reference `wanted` until it stands still; returns the final and the largest
 /// position.
 fn follow(
