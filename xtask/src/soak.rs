@@ -47,6 +47,8 @@ pub fn run(arguments: &SoakArguments) -> Result<(), ChoreError> {
             "soak",
             "--",
             "--nocapture",
+            // That of the image is ignored by default.
+            "--include-ignored",
         ],
         &[
             ("PAINLEVE_SOAK_MINUTES", &minutes(arguments.hours)),
