@@ -144,6 +144,11 @@ impl Live {
         };
     }
 
+    fn pause(&mut self) {
+        self.paused = true;
+        self.steps = 0;
+    }
+
     /// Executes a viewer's request and reports the outcome to the viewers.
     fn execute(&mut self, order: Order) {
         let outcome = self.obey(&order.request);
@@ -162,9 +167,10 @@ impl Live {
     /// One sentence for the viewer if it is impossible.
     fn obey(&mut self, request: &ViewerRequest) -> Result<String, String> {
         match *request {
-            ViewerRequest::Pause => self.paused = true,
+            ViewerRequest::Pause => self.pause(),
             ViewerRequest::Resume => {
                 self.paused = false;
+                self.steps = 0;
                 self.restart_clock();
             }
             ViewerRequest::Step { ticks } => {
@@ -217,6 +223,7 @@ impl Live {
         self.running = self.scenario.clone();
         self.ticks = 0;
         self.ticks_at_status = 0;
+        self.steps = 0;
         // Ticks may be slower from now on.
         self.stride = 1;
         self.restart_clock();
@@ -282,7 +289,7 @@ impl Live {
             if let Err(error) = self.closed_loop.tick(&mut self.viewers) {
                 // A plant that cannot go on may be reset.
                 self.hub.refuse(&error.to_string());
-                self.paused = true;
+                self.pause();
                 break;
             }
             self.ticks += 1;
@@ -343,4 +350,50 @@ fn start(scenario: &Scenario, viewers: &Viewers) -> Result<ClosedLoop<Host>, Com
         Simulation::new(scenario).map_err(range)?,
         viewers.host(controller),
     ))
+}
+
+#[cfg(test)]
+mod tests {
+    use painleve_plant::scenario::built_in;
+
+    use super::*;
+
+    fn started(overrides: &[&str]) -> Live {
+        let overrides: Vec<_> = overrides.iter().map(ToString::to_string).collect();
+        let scenario = Scenario::load(built_in::DEFAULT, &overrides).unwrap();
+        let mut live = Live::new(scenario, String::new(), Arc::default()).unwrap();
+        live.started = true;
+        live
+    }
+
+    #[test]
+    fn an_order_ends_the_steps_that_remain() {
+        use ViewerRequest::{Pause, Reset, Resume, Step};
+        let mut live = started(&[]);
+        for orders in [&[Pause][..], &[Resume, Pause], &[Reset]] {
+            live.obey(&Step { ticks: 100_000 }).unwrap();
+            for order in orders {
+                live.obey(order).unwrap();
+            }
+            let before = live.ticks;
+            live.slice();
+            assert_eq!((live.ticks, live.is_idle), (before, true), "{orders:?}");
+        }
+    }
+
+    #[test]
+    fn a_plant_that_fails_ends_the_steps_that_remain() {
+        let mut live = started(&[
+            "arm.link_mass_kg=[0.001, 0.001]",
+            "arm.damping_nms_rad=[1000.0, 1000.0]",
+        ]);
+        live.obey(&ViewerRequest::Step { ticks: 100_000 }).unwrap();
+        let ends = (0..10_000).any(|_| {
+            live.slice();
+            live.steps == 0
+        });
+        assert!(ends && live.ticks < 6000, "{} ticks", live.ticks);
+        live.slice();
+        assert!(live.is_idle);
+    }
 }
