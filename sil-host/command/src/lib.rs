@@ -206,6 +206,14 @@ pub enum CommandError {
     /// A process of the run could not be started or has died.
     #[error(transparent)]
     Process(#[from] ProcessError),
+    /// A process of the run failed with an error that is this command's as well.
+    #[error("{message}")]
+    Reported {
+        /// Its exit code.
+        code: u8,
+        /// Its error.
+        message: String,
+    },
     /// A process of the run failed and has already printed its error.
     #[error("")]
     Told {
@@ -232,7 +240,7 @@ pub enum CommandError {
 impl CommandError {
     /// 1: the plant failed, a drive ended with a fault, an arm or board was refused, or a sweep is incomplete;
     /// 2: bad input; 3: a peer is missing or has died; 4: an output cannot be written; 5: deadlines missed;
-    /// 130: interrupted.
+    /// 6: a condition of --fail-on is met; 70: a bug; 130: interrupted.
     fn exit_code(&self) -> u8 {
         match self {
             Self::Scenario(_)
@@ -273,7 +281,7 @@ impl CommandError {
             Self::Loop(LoopError::Interrupted) | Self::Interrupted => INTERRUPTED,
             Self::DeadlinesMissed(_) => DEADLINES_MISSED,
             Self::FailedOn(_) => FAILED_ON,
-            Self::Told { code } => *code,
+            Self::Reported { code, .. } | Self::Told { code } => *code,
             Self::Unread => 0,
         }
     }

@@ -36,9 +36,6 @@ pub enum OutputError {
     /// A part of a file.
     #[error(transparent)]
     Write(#[from] io::Error),
-    /// A file of another process of the run, as it has reported.
-    #[error("{0}")]
-    Reported(String),
     /// A temporary file.
     #[error(
         "cannot write a temporary file in {}: {}; set TMPDIR to a folder that can be written",

@@ -23,7 +23,7 @@ use super::fail_on::{self, FailOn};
 use super::join::JoinArguments;
 use super::live;
 use super::output::OutputArguments;
-use super::output_error::{InputError, OutputError, output};
+use super::output_error::{InputError, output};
 use super::patience::PatienceArguments;
 use super::plan::Plan;
 use super::plant::{self, PlantArguments};
@@ -31,7 +31,7 @@ use super::process_error::ProcessError;
 use super::run_process::{RunProcess, WATCH, complaint};
 use super::scenario::ScenarioArguments;
 use super::system_path::SystemPath;
-use super::{CommandError, DEADLINES_MISSED, INTERRUPTED, PEER_FAILED, UNWRITABLE};
+use super::{CommandError, DEADLINES_MISSED, INTERNAL_ERROR, INTERRUPTED, PEER_FAILED, UNWRITABLE};
 
 /// Where the controller runs.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
@@ -279,7 +279,7 @@ pub fn run(arguments: &RunArguments) -> Result<(), CommandError> {
             let text = controller.stderr.text();
             let complaint = complaint(&text);
             let failed = || ProcessError::Failed { status, complaint }.into();
-            return Err(unwritable(status, &text).unwrap_or_else(failed));
+            return Err(failure_of_its_own(status, &text).unwrap_or_else(failed));
         }
         None => {
             return Err(ProcessError::Outlived.into());
@@ -307,13 +307,19 @@ pub fn run(arguments: &RunArguments) -> Result<(), CommandError> {
     fail_on::check(&arguments.fail_on, &report)
 }
 
-/// Returns the failure of a controller's process that could not write its file: an output of this command.
-fn unwritable(status: ExitStatus, text: &str) -> Option<CommandError> {
-    (status.code() == Some(i32::from(UNWRITABLE))).then(|| match cause(text) {
-        Some(cause) => output(OutputError::Reported(cause.into())),
-        // With --log, it has been shown.
-        None => CommandError::Told { code: UNWRITABLE },
-    })
+/// Returns the failure of a controller's process that is this command's as well: an output that it could not write, or a bug.
+fn failure_of_its_own(status: ExitStatus, text: &str) -> Option<CommandError> {
+    let code = u8::try_from(status.code()?).ok()?;
+    [UNWRITABLE, INTERNAL_ERROR]
+        .contains(&code)
+        .then(|| match cause(text) {
+            Some(cause) => CommandError::Reported {
+                code,
+                message: cause.into(),
+            },
+            // With --log, it has been shown.
+            None => CommandError::Told { code },
+        })
 }
 
 /// Returns the failure of a plant whose peer has failed. The plant only knows that the controller has
@@ -329,9 +335,11 @@ fn peer_failure(
         .filter(|it| !it.success())
     {
         let text = controller.stderr.text();
+        if let Some(failure) = failure_of_its_own(status, &text) {
+            return Ok(failure);
+        }
         if let Some(cause) = cause(&text) {
-            let reported = || ProcessError::Reported(cause.into()).into();
-            return Ok(unwritable(status, &text).unwrap_or_else(reported));
+            return Ok(ProcessError::Reported(cause.into()).into());
         }
     }
     Ok(match message.trim() {
@@ -388,7 +396,7 @@ fn watch(
                     };
                     error.into()
                 };
-                return Err(unwritable(status, &text).unwrap_or_else(ended_early));
+                return Err(failure_of_its_own(status, &text).unwrap_or_else(ended_early));
             }
         }
         for (part, process) in [("plant", &mut *plant), ("controller", &mut *controller)] {
@@ -446,6 +454,23 @@ fn failure(status: ExitStatus) -> CommandError {
 mod tests {
     use super::*;
     use painleve_link::LinkError;
+    use std::os::unix::process::ExitStatusExt;
+
+    #[test]
+    fn a_run_ends_with_the_code_of_a_controller_that_has_a_bug_or_cannot_write() {
+        for code in [INTERNAL_ERROR, UNWRITABLE] {
+            let status = ExitStatus::from_raw(i32::from(code) << 8);
+            let failure = failure_of_its_own(status, "error: cause\n").unwrap();
+            assert_eq!(
+                (failure.exit_code(), &*failure.to_string()),
+                (code, "cause")
+            );
+            let shown = failure_of_its_own(status, "").unwrap();
+            assert_eq!((shown.exit_code(), &*shown.to_string()), (code, ""));
+        }
+        let lost = ExitStatus::from_raw(i32::from(PEER_FAILED) << 8);
+        assert!(failure_of_its_own(lost, "error: cause\n").is_none());
+    }
 
     #[test]
     fn the_cause_of_a_failure_is_no_consequence_of_it() {
