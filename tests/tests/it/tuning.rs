@@ -2,10 +2,10 @@
 
 #![allow(clippy::unwrap_used)]
 
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use nix::sys::signal::Signal;
-use painleve_tests::{Bench, code, errors, signal};
+use painleve_tests::{Bench, code, errors, is_running, signal};
 use serde_json::Value;
 
 const KEYS: [&str; 5] = [
@@ -123,7 +123,10 @@ fn one_search_at_a_time_has_a_table_and_an_interrupted_one_leaves_it_whole() {
     let bench = Bench::new("tune-twice");
     std::fs::write(bench.path("off.toml"), OFF).unwrap();
     let first = bench.start(&[&KEYS[..], &["--trials", "100000"]].concat());
+    let start = Instant::now();
     while !bench.path("out/tune.csv").exists() {
+        let is_patient = start.elapsed() < Duration::from_secs(20);
+        assert!(is_patient && is_running(first.id()), "no table");
         std::thread::sleep(Duration::from_millis(10));
     }
     let second = bench.run(&KEYS);
