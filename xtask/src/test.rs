@@ -116,6 +116,7 @@ fn workspace_tests(arguments: &TestArguments) -> Result<Vec<String>, ChoreError>
         vec![
             "test",
             "--workspace",
+            "--no-fail-fast",
             "--profile",
             PROFILE,
             "--lib",
@@ -136,9 +137,6 @@ fn workspace_tests(arguments: &TestArguments) -> Result<Vec<String>, ChoreError>
         .env("PAINLEVE_SKIPPED", notices.path());
     eprintln!("$ cargo {}", line.join(" "));
     let durations = passed_through(tests)?;
-    if arguments.durations && !has_nextest {
-        say("--durations: requires cargo-nextest")?;
-    }
     let is_listed = |rank: usize, seconds: f64| {
         (arguments.durations && rank < LISTED) || (!arguments.all && seconds > LONGEST_TEST_S)
     };
@@ -155,6 +153,11 @@ fn workspace_tests(arguments: &TestArguments) -> Result<Vec<String>, ChoreError>
         .collect();
     skipped.sort();
     skipped.dedup();
+    if !has_nextest {
+        skipped.push(
+            "one by one, the tests that measure time; the list of slow tests: cargo-nextest is missing".to_owned(),
+        );
+    }
     Ok(skipped)
 }
 
