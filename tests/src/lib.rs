@@ -303,8 +303,8 @@ pub fn is_running(id: i32) -> bool {
     })
 }
 
-/// Runs a command in namespaces of its own, as `unshare` makes them; `None`, with a word on
-/// standard error, where that is not permitted.
+/// Runs a command in namespaces of its own, as `unshare` makes them; `None`, with a notice, where
+/// that is not permitted.
 ///
 /// # Panics
 /// If the command cannot be started.
@@ -316,7 +316,10 @@ pub fn unshared(namespaces: &[&str], command: &mut Command) -> Option<Output> {
     };
     let permitted = unshare(OsStr::new("true")).output();
     if !permitted.is_ok_and(|output| output.status.success()) {
-        eprintln!("skipped: unshare {} is not permitted", namespaces.join(" "));
+        skipped(&format!(
+            "unshare {} is not permitted",
+            namespaces.join(" ")
+        ));
         return None;
     }
     let mut unshare = unshare(command.get_program());

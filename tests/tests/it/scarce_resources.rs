@@ -5,10 +5,11 @@ use std::process::{Command, Output};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use painleve_tests::{Bench, code, errors, program, unshared};
+use painleve_tests::{Bench, code, errors, program, skipped, unshared};
 
 const SHORT: &str = "--set run.duration_s=0.05 --no-plot --json";
 const SOON: Duration = Duration::from_secs(10);
+const WITHOUT_STRACE: &str = "strace not found; on Debian: apt-get install strace";
 
 /// Runs a shell command, in which `$P` is the program, in a separate mount namespace.
 fn with_own_mounts(bench: &Bench, line: &str) -> Option<Output> {
@@ -138,8 +139,7 @@ fn data_and_names_are_on_the_disk_before_a_file_is_reported() {
         .args(SHORT.split(' '))
         .current_dir(bench.path(""));
     let Ok(output) = traced.output() else {
-        eprintln!("strace is not installed: not tested");
-        return;
+        return skipped(WITHOUT_STRACE);
     };
     assert_eq!(code(output.status), 0, "{output:?}");
     let trace = std::fs::read_to_string(bench.path("trace")).unwrap();
@@ -178,7 +178,7 @@ fn memory_refused_to_a_new_thread_ends_a_run_with_one_message() {
         .current_dir(bench.path(""));
     match starved.output() {
         Ok(output) => assert_reported(&output, 3, "refuses"),
-        Err(_) => eprintln!("strace is not installed: not tested"),
+        Err(_) => skipped(WITHOUT_STRACE),
     }
 }
 
