@@ -32,7 +32,7 @@ pub fn nightly() -> Result<(), ChoreError> {
 /// Runs the test.
 ///
 /// # Errors
-/// If it does not build, or finds a flaw.
+/// If it does not build, finds a flaw, or disturbs nothing.
 pub fn run(arguments: &ChaosArguments) -> Result<(), ChoreError> {
     let options: Vec<_> = arguments.options.iter().map(String::as_str).collect();
     start(&options)

@@ -46,7 +46,7 @@ const FURTHER_STEPS: [(&str, Step); 11] = [
     ("FMU", fmu::run_chore),
     ("malformed input, 2,000 cases each", fuzz::nightly),
     ("soak", soak::nightly),
-    ("chaos, 1,000 injections", chaos::nightly),
+    ("chaos, 1,000 trials", chaos::nightly),
 ];
 
 type Step = fn() -> Result<(), ChoreError>;

@@ -95,7 +95,7 @@ fn main() -> ExitCode {
 /// Runs the trials and prints a table of counts.
 ///
 /// # Errors
-/// If a process cannot be started or watched, or a flaw is found.
+/// If a process cannot be started or watched, a flaw is found, or no disturbance took effect.
 fn run(arguments: &ChaosArguments) -> io::Result<()> {
     // A copy, because the program may be rebuilt during the trials.
     let programs = tempfile::tempdir()?;
@@ -195,6 +195,9 @@ fn run(arguments: &ChaosArguments) -> io::Result<()> {
     let found = table.findings + segments.len();
     if found > 0 {
         return Err(io::Error::other(format!("chaos found {found} flaws")));
+    }
+    if table.injections() == 0 {
+        return Err(io::Error::other("no disturbance took effect"));
     }
     Ok(())
 }

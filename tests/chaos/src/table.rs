@@ -77,7 +77,6 @@ impl TrialTable {
             "trials",
             "injections"
         )?;
-        let mut sum = 0;
         for (name, row) in &self.rows {
             let counts: String = FLAWS
                 .map(|(flaw, _)| format!("{:>10}", row.flaws.get(&flaw).unwrap_or(&0)))
@@ -88,12 +87,12 @@ impl TrialTable {
                 row.trials,
                 row.injections
             )?;
-            sum += row.injections;
         }
         self.print_noticed(patience_s)?;
         writeln!(
             stdout(),
-            "{sum} injections in {:.0} s at a load of {}, {} flaws, {} segments left{}",
+            "{} injections in {:.0} s at a load of {}, {} flaws, {} segments left{}",
+            self.injections(),
             took.as_secs_f64(),
             load(),
             self.findings,
@@ -103,6 +102,11 @@ impl TrialTable {
                 .map(|name| format!("\n  {name}"))
                 .collect::<String>(),
         )
+    }
+
+    /// Returns the number of disturbances that took effect.
+    pub fn injections(&self) -> usize {
+        self.rows.values().map(|row| row.injections).sum()
     }
 
     fn print_noticed(&mut self, [silence_s, wait_s]: &[String; 2]) -> io::Result<()> {
