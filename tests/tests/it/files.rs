@@ -5,7 +5,6 @@ use std::ffi::OsStr;
 use std::fs;
 use std::os::unix::ffi::OsStrExt;
 use std::os::unix::fs::{PermissionsExt, lchown, symlink};
-use std::path::Path;
 use std::process::{Command, Output};
 use std::time::Duration;
 
@@ -293,36 +292,36 @@ fn links_of_another_user_are_not_followed() {
     link("file", "mine");
     link("folder", ".");
     link("new", "not-there");
-    let mut tried = 0;
+    let mut lines = vec![
+        "man shared/folder".to_owned(),
+        "figures --draft --out shared/folder".to_owned(),
+        "sweep plan campaign.toml --shards 2 --folder shared/folder".to_owned(),
+    ];
     for path in [
         "shared/file",
         "shared/folder/mine",
         "shared/new",
         "shared/folder/new",
     ] {
-        for line in [
-            &format!("run edge --set run.duration_s=0.05 --no-plot --record {path}"),
-            &format!("run edge --set run.duration_s=0.05 --no-plot --no-record --csv {path}"),
-            &format!("export r.mcap --csv {path}"),
-            &format!("{STUDY} --csv {path}"),
-            &format!("sweep merge --folder sw --csv {path}"),
-            &format!("commission edge --rehearse --output {path}"),
-            "man shared/folder",
-            "figures --draft --out shared/folder",
-            "sweep plan campaign.toml --shards 2 --folder shared/folder",
-        ] {
-            let output = run(&bench, line);
-            assert_eq!(code(output.status), 4, "{line}: {output:?}");
-            assert!(
-                errors(&output).contains("link of another user"),
-                "{line}: {output:?}"
-            );
-            tried += 1;
-        }
+        lines.extend([
+            format!("run edge --set run.duration_s=0.05 --no-plot --record {path}"),
+            format!("run edge --set run.duration_s=0.05 --no-plot --no-record --csv {path}"),
+            format!("export r.mcap --csv {path}"),
+            format!("{STUDY} --csv {path}"),
+            format!("sweep merge --folder sw --csv {path}"),
+            format!("commission edge --rehearse --output {path}"),
+        ]);
+    }
+    for line in lines {
+        let output = run(&bench, &line);
+        assert_eq!(code(output.status), 4, "{line}: {output:?}");
+        assert!(
+            errors(&output).contains("link of another user"),
+            "{line}: {output:?}"
+        );
     }
     assert_eq!(fs::read(home.join("mine")).unwrap(), b"mine");
     assert_eq!(fs::read_dir(&home).unwrap().count(), 1);
-    assert_eq!(tried, 36);
 }
 
 #[test]
@@ -548,5 +547,4 @@ fn help_that_cannot_be_written_is_an_error() {
         assert_eq!(code(run(&bench, line).status), 0, "{line}");
     }
     assert_eq!(code(run(&bench, "run --no-such-option").status), 2);
-    assert!(Path::new(program()).exists());
 }
