@@ -66,15 +66,32 @@ pub fn check_distinct(outputs: &[Output<'_>]) -> Result<(), CommandError> {
 pub fn check(outputs: &[Output<'_>]) -> Result<(), CommandError> {
     check_distinct(outputs)?;
     for (_, path) in outputs {
-        let folders = path.ancestors().skip(1);
-        let missing: Vec<_> = folders.take_while(|folder| !folder.exists()).collect();
-        drop(AtomicFile::create(path).map_err(output)?);
-        for folder in missing {
-            // The command may yet fail, and then leaves nothing.
+        try_out(path)?;
+    }
+    Ok(())
+}
+
+/// New folders. Those that are empty are removed when this is dropped: a command that fails leaves nothing.
+pub struct NewFolders(Vec<PathBuf>);
+
+impl Drop for NewFolders {
+    fn drop(&mut self) {
+        for folder in &self.0 {
             let _ = fs::remove_dir(folder);
         }
     }
-    Ok(())
+}
+
+/// Checks that an output can be written, and makes the folders that it lacks.
+///
+/// # Errors
+/// [`CommandError::Output`].
+pub fn try_out(path: &Path) -> Result<NewFolders, CommandError> {
+    let folders = path.ancestors().skip(1);
+    let missing = folders.take_while(|folder| !folder.exists());
+    let new = NewFolders(missing.map(Path::to_path_buf).collect());
+    drop(AtomicFile::create(path).map_err(output)?);
+    Ok(new)
 }
 
 /// `None` if the path has no place; its use will say why.

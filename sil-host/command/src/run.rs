@@ -5,7 +5,6 @@ use std::time::Duration;
 
 use clap::{Args, ValueEnum};
 use painleve_board::{emulator, serial};
-use painleve_files::atomic_file::AtomicFile;
 use painleve_files::input_file;
 use painleve_link::{BusName, Pacing, Pair};
 use painleve_plant::scenario::Scenario;
@@ -18,12 +17,12 @@ use super::bridge::{
     BridgeArguments, BridgeTarget, BusArguments, ImageArguments, SensorLineArguments,
 };
 use super::controller::ControllerArguments;
-use super::distinct_files::check_distinct;
+use super::distinct_files::{check_distinct, try_out};
 use super::fail_on::{self, FailOn};
 use super::join::JoinArguments;
 use super::live;
 use super::output::OutputArguments;
-use super::output_error::{InputError, output};
+use super::output_error::InputError;
 use super::patience::PatienceArguments;
 use super::plan::Plan;
 use super::plant::{self, PlantArguments};
@@ -106,6 +105,7 @@ pub struct RunArguments {
     /// in one process, writes no files, and continues until Ctrl-C.
     #[arg(long, value_name = "PORT", num_args = 0..=1, default_missing_value = "8765")]
     #[arg(conflicts_with_all = ["bus", "port", "fail_on", "record", "plot", "html", "csv"])]
+    #[arg(conflicts_with_all = ["no_record", "no_plot", "no_html"])]
     #[arg(conflicts_with_all = ["timing", "verbose", "quiet", "json", "pacing", "silence_limit_s"])]
     live: Option<u16>,
     /// With --live: let every user of this machine watch and steer the run, also without the token in the
@@ -221,9 +221,8 @@ pub fn run(arguments: &RunArguments) -> Result<(), CommandError> {
     if arguments.host == Host::Qemu {
         emulator::check(&arguments.image.path(), arguments.image.log)?;
     }
-    if let Some((_, path)) = timing {
-        drop(AtomicFile::create(path).map_err(output)?);
-    }
+    // Beyond the end of the processes, which use them.
+    let _new_folders = timing.map(|(_, path)| try_out(path)).transpose()?;
     if let (Host::Serial, Some(port)) = (arguments.host, &arguments.port) {
         serial::check(port)?;
     }

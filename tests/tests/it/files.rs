@@ -222,6 +222,9 @@ fn options_without_effect_are_refused() {
         ("run edge --live 0 --verbose", "--verbose"),
         ("run edge --live 0 --csv x.csv", "--csv"),
         ("run edge --live 0 --record x.mcap", "--record"),
+        ("run edge --live 0 --no-record", "--no-record"),
+        ("run edge --live 0 --no-plot", "--no-plot"),
+        ("run edge --live 0 --no-html", "--no-html"),
         ("run edge --live 0 --pacing realtime", "--pacing"),
         ("run edge --live 0 --silence-limit-s 3", "--silence-limit-s"),
         (
@@ -530,6 +533,15 @@ fn a_file_size_limit_leaves_no_file_of_a_run() {
         assert_eq!(code(output.status), 4, "{line}: {output:?}");
         assert_eq!(bench.files(), [""; 0], "{line}");
     }
+}
+
+#[test]
+fn a_run_that_fails_leaves_no_new_folder() {
+    let bench = Bench::new("new-folder");
+    let line = "run edge --host serial --port nowhere --timing new/costs.json";
+    let output = run(&bench, line);
+    assert_eq!(code(output.status), 3, "{output:?}");
+    assert!(!bench.path("new").exists());
 }
 
 #[test]

@@ -337,6 +337,7 @@ fn a_study_interrupted_while_its_figure_is_converted_leaves_neither_files_nor_th
 #[test]
 fn costs_that_cannot_be_written_at_the_end_of_a_run_end_it_with_the_code_of_outputs() {
     let bench = Bench::new("costs");
+    fs::create_dir(bench.path("t")).unwrap();
     let line =
         "run edge --host drivers --set run.duration_s=100 --no-record --no-plot --timing t/t.json";
     let running = bench.start(&line.split_whitespace().collect::<Vec<_>>());
