@@ -220,10 +220,14 @@ impl Dist {
     }
 
     fn wheel_for(&self, processor: &str) -> Result<PathBuf, ChoreError> {
+        let start = concat!("painleve-", env!("CARGO_PKG_VERSION"), "-");
         let end = format!("{processor}.whl");
         let files = fs::read_dir(&self.folder).into_iter().flatten().flatten();
-        let mut paths = files.map(|file| file.path());
-        let found = paths.find(|path| path.to_string_lossy().ends_with(&end));
+        // A folder that is not emptied may hold those of other versions.
+        let found = files.map(|file| file.path()).find(|path| {
+            let name = path.file_name().unwrap_or_default().to_string_lossy();
+            name.starts_with(start) && name.ends_with(&end)
+        });
         found.ok_or_else(|| ChoreError(format!("maturin has made no wheel for {processor}")))
     }
 
