@@ -7,8 +7,9 @@ use clap::Args;
 
 use crate::build_fw::{debian_can_build, target_is_installed};
 use crate::command::{ChoreError, run_with, starts, workspace};
+use crate::examples::CHIPS;
 use crate::files::unwritable;
-use crate::{examples, policy};
+use crate::policy;
 
 /// Executes the board's image in tests; see `tests/flash-image`.
 const UNICORN: &str = "unicorn==2.1.4";
@@ -51,7 +52,7 @@ pub fn run(arguments: &SetupArguments) -> Result<(), ChoreError> {
     } else {
         Tools::Default
     };
-    install_required(arguments.sudo)?;
+    install_required(&CHIPS, arguments.sudo)?;
     if tools == Tools::All {
         install(&missing_further(), arguments.sudo)?;
         policy::install();
@@ -66,11 +67,11 @@ pub fn run(arguments: &SetupArguments) -> Result<(), ChoreError> {
 /// # Errors
 /// If a tool of the default tier cannot be installed.
 pub fn install_missing(tools: Tools) -> Result<Vec<&'static str>, ChoreError> {
-    install_required(false)?;
-    let missing = match tools {
-        Tools::Default => Vec::new(),
-        Tools::All => missing_further(),
+    let (chips, missing) = match tools {
+        Tools::Default => (&CHIPS[..1], Vec::new()),
+        Tools::All => (&CHIPS[..], missing_further()),
     };
+    install_required(chips, false)?;
     let mut missing = match install(&missing, false) {
         Ok(()) => Vec::new(),
         Err(ChoreError(reason)) => {
@@ -84,9 +85,9 @@ pub fn install_missing(tools: Tools) -> Result<Vec<&'static str>, ChoreError> {
     Ok(missing)
 }
 
-/// Installs the Rust targets, QEMU and Unicorn.
-fn install_required(sudo: bool) -> Result<(), ChoreError> {
-    let chips = examples::CHIPS.iter().map(|(chip, _)| *chip);
+/// Installs the Rust targets of chips, QEMU and Unicorn.
+fn install_required(chips: &[(&str, &str)], sudo: bool) -> Result<(), ChoreError> {
+    let chips = chips.iter().map(|(chip, _)| *chip);
     let missing: Vec<_> = chips.filter(|chip| !target_is_installed(chip)).collect();
     if !missing.is_empty() && !debian_can_build() {
         eprintln!("missing: the Rust targets {}", missing.join(", "));
