@@ -8,6 +8,9 @@ use std::path::{Path, PathBuf};
 /// Largest difference between a printed figure and the measured one, relative to the measured one.
 const TOLERANCE: f64 = 0.03;
 
+const UPDATE: &str = "update it with\n\
+    UPDATE_DOCUMENTATION=1 cargo test -p painleve-tests --tests -- --test-threads 1";
+
 /// Whether the last figure of every line is a limit, which must be printed exactly.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LastFigure {
@@ -39,10 +42,30 @@ pub fn check(page: &str, name: &str, expected: &str, last: LastFigure) {
         return;
     }
     if let Err(reason) = compare(present.trim(), expected.trim(), last) {
-        panic!(
-            "docs/{page}, part '{name}': {reason}; update it with\n\
-             UPDATE_DOCUMENTATION=1 cargo test -p painleve-tests --tests -- --test-threads 1"
-        );
+        panic!("docs/{page}, part '{name}': {reason}; {UPDATE}");
+    }
+}
+
+/// Compares a row of a table of a page of `docs/` with its expected text, whose last figure is a limit, or writes that text
+/// if `UPDATE_DOCUMENTATION` is set.
+///
+/// # Panics
+/// If no row has the same first cell, or if the row is not up to date.
+pub fn check_row(page: &str, expected: &str) {
+    let path = page_path(page);
+    let text = std::fs::read_to_string(&path).unwrap_or_else(|error| panic!("{page}: {error}"));
+    let cell = expected.split('|').nth(1).unwrap_or_default();
+    let begin = format!("|{cell}|");
+    let Some(present) = text.lines().find(|line| line.starts_with(&begin)) else {
+        panic!("docs/{page} has no row '{cell}'");
+    };
+    if std::env::var_os("UPDATE_DOCUMENTATION").is_some() {
+        let text = text.replace(present, expected);
+        std::fs::write(&path, text).unwrap_or_else(|error| panic!("{page}: {error}"));
+        return;
+    }
+    if let Err(reason) = compare(present, expected, LastFigure::Limit) {
+        panic!("docs/{page}: {reason}; {UPDATE}");
     }
 }
 
