@@ -65,25 +65,30 @@ fn a_file_size_limit_is_reported_like_a_full_disk() {
 
 #[test]
 fn signals_are_handled_while_a_process_waits_for_its_peer() {
-    for role in ["plant", "controller"] {
-        for sent in [Signal::SIGINT, Signal::SIGTERM] {
-            let bench = Bench::new("waiting");
-            let running = bench.start(&[role, "--bus", &bench.bus, "--wait-s", "60"]);
-            std::thread::sleep(Duration::from_millis(300));
-            signal(running.id(), sent);
-            let (output, took) = running.end(SOON);
-            assert_eq!(code(output.status), 130, "{output:?}");
-            assert_eq!(errors(&output), "error: interrupted\n");
-            assert!(took < Duration::from_secs(2), "{took:?}");
-            assert_eq!(bench.files(), [""; 0]);
+    let interrupted = |role: &str, sent: Signal| {
+        let bench = Bench::new(&format!("waiting-{role}-{sent}"));
+        let running = bench.start(&[role, "--bus", &bench.bus, "--wait-s", "60"]);
+        std::thread::sleep(Duration::from_millis(300));
+        signal(running.id(), sent);
+        let (output, took) = running.end(SOON);
+        assert_eq!(code(output.status), 130, "{output:?}");
+        assert_eq!(errors(&output), "error: interrupted\n");
+        assert!(took < Duration::from_secs(2), "{took:?}");
+        assert_eq!(bench.files(), [""; 0]);
+    };
+    std::thread::scope(|scope| {
+        for role in ["plant", "controller"] {
+            for sent in [Signal::SIGINT, Signal::SIGTERM] {
+                scope.spawn(move || interrupted(role, sent));
+            }
         }
-    }
+    });
 }
 
 #[test]
 fn a_process_stopped_during_its_start_is_detected() {
-    for role in ["controller", "plant"] {
-        let bench = Bench::new("stopped");
+    let stopped = |role: &str| {
+        let bench = Bench::new(&format!("stopped-{role}"));
         let long = ["run", "--bus", &bench.bus, "--set", "run.duration_s=100000"];
         let running = bench.start(&long);
         let id = child_of(running.id(), role);
@@ -98,7 +103,12 @@ fn a_process_stopped_during_its_start_is_detected() {
             start.elapsed()
         );
         assert_eq!(errors(&output).matches("error: ").count(), 1, "{output:?}");
-    }
+    };
+    std::thread::scope(|scope| {
+        for role in ["controller", "plant"] {
+            scope.spawn(move || stopped(role));
+        }
+    });
 }
 
 /// A wall clock that is a day off in one direction or the other, by turns at each reading.
