@@ -26,35 +26,50 @@ fn program(names: &[&'static str]) -> Option<&'static str> {
     found
 }
 
-/// Runs a script of `browser/` and shows what it printed if it fails.
-fn run_script(name: &str, arguments: &[&str]) {
-    let chromium = program(&["chromium", "chromium-browser", "google-chrome"]);
-    let (Some(node), Some(chromium)) = (program(&["node"]), chromium) else {
-        return;
-    };
-    let script = Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("browser")
-        .join(name);
-    let output = Command::new(node)
-        .arg(script)
-        .arg(chromium)
-        .args(arguments)
-        .output()
-        .unwrap_or_else(|error| panic!("cannot start {node}: {error}"));
-    let [stdout, stderr] =
-        [&output.stdout, &output.stderr].map(|text| String::from_utf8_lossy(text));
-    assert!(output.status.success(), "{stdout}\n{stderr}");
-    println!("{stdout}");
+/// The programs that run the scripts of `browser/`.
+struct Browser {
+    node: &'static str,
+    chromium: &'static str,
+}
+
+impl Browser {
+    /// Returns what the machine has; prints a notice if something is missing.
+    fn find() -> Option<Self> {
+        Some(Self {
+            node: program(&["node"])?,
+            chromium: program(&["chromium", "chromium-browser", "google-chrome"])?,
+        })
+    }
+
+    /// Runs a script and shows what it printed if it fails.
+    fn run(&self, name: &str, arguments: &[&str]) {
+        let script = Path::new(env!("CARGO_MANIFEST_DIR"))
+            .join("browser")
+            .join(name);
+        let output = Command::new(self.node)
+            .arg(script)
+            .arg(self.chromium)
+            .args(arguments)
+            .output()
+            .unwrap_or_else(|error| panic!("cannot start {}: {error}", self.node));
+        let [stdout, stderr] =
+            [&output.stdout, &output.stderr].map(|text| String::from_utf8_lossy(text));
+        assert!(output.status.success(), "{stdout}\n{stderr}");
+        println!("{stdout}");
+    }
 }
 
 #[test]
 fn the_page_of_a_run_plays_zooms_and_has_no_error() {
+    let Some(browser) = Browser::find() else {
+        return;
+    };
     let bench = Bench::new("page");
     for scenario in ["edge", "open-loop-bounce"] {
         let file = format!("{scenario}.html");
         let path = bench.path(&file);
         bench.report(&["run", scenario, "--json", "--no-record", "--html", &file]);
-        run_script("page.mjs", &[path.to_str().unwrap()]);
+        browser.run("page.mjs", &[path.to_str().unwrap()]);
     }
 }
 
@@ -66,8 +81,10 @@ fn a_live_run_is_watched_paused_stepped_set_pushed_and_reset() {
 
 /// Operates the page of a live run.
 fn watch_live(bench: &Bench, arguments: &[&str], script: &str) {
-    let run = LiveRun::start(bench, arguments);
-    run_script(script, &[&run.page]);
+    if let Some(browser) = Browser::find() {
+        let run = LiveRun::start(bench, arguments);
+        browser.run(script, &[&run.page]);
+    }
 }
 
 #[test]
@@ -96,6 +113,9 @@ fn the_page_of_a_long_run_is_small() {
 
 #[test]
 fn no_label_of_a_picture_overlaps_another_or_is_cut_off_or_too_small() {
+    let Some(browser) = Browser::find() else {
+        return;
+    };
     let bench = Bench::new("pictures");
     let images = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/images");
     let entries = std::fs::read_dir(images).unwrap();
@@ -127,5 +147,5 @@ fn no_label_of_a_picture_overlaps_another_or_is_cut_off_or_too_small() {
         pictures.push(bench.path(&file));
     }
     let pictures: Vec<_> = pictures.iter().map(|path| path.to_str().unwrap()).collect();
-    run_script("pictures.mjs", &pictures);
+    browser.run("pictures.mjs", &pictures);
 }
