@@ -163,6 +163,17 @@ impl Bench {
             .unwrap_or_else(|error| panic!("cannot start painleve: {error}"))
     }
 
+    /// Runs a line of bash in the folder, in which `$P` is the program.
+    ///
+    /// # Panics
+    /// If bash cannot be started.
+    pub fn shell(&self, line: &str) -> Output {
+        let mut shell = Command::new("bash");
+        shell.args(["-c", line]).env("P", program());
+        let output = shell.current_dir(self.folder.path()).output();
+        output.unwrap_or_else(|error| panic!("cannot start bash: {error}"))
+    }
+
     /// Runs the program and parses its standard output, which must be one JSON object.
     ///
     /// # Panics

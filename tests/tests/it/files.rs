@@ -5,12 +5,12 @@ use std::ffi::OsStr;
 use std::fs;
 use std::os::unix::ffi::OsStrExt;
 use std::os::unix::fs::{PermissionsExt, lchown, symlink};
-use std::process::{Command, Output};
+use std::process::Output;
 use std::time::Duration;
 
 use nix::sys::stat::Mode;
 use nix::unistd::{geteuid, mkfifo};
-use painleve_tests::{Bench, code, errors, program, skipped};
+use painleve_tests::{Bench, code, errors, skipped};
 use serde_json::{Value, json};
 
 const SOON: Duration = Duration::from_secs(10);
@@ -23,14 +23,6 @@ const STUDY: &str =
 
 fn run(bench: &Bench, line: &str) -> Output {
     bench.run(&line.split_whitespace().collect::<Vec<_>>())
-}
-
-/// Runs a shell command in which `$P` is the program.
-#[allow(clippy::unwrap_used)]
-fn shell(bench: &Bench, line: &str) -> Output {
-    let mut shell = Command::new("bash");
-    shell.args(["-c", line]).env("P", program());
-    shell.current_dir(bench.path("")).output().unwrap()
 }
 
 /// Every file of a bench with its content.
@@ -184,7 +176,7 @@ fn no_output_replaces_an_input_or_another_output() {
         "run - --no-plot --record s.toml",
         "drive edge --port /dev/null --record s.toml",
     ] {
-        let output = shell(&bench, &format!("$P {line} <hard.toml"));
+        let output = bench.shell(&format!("$P {line} <hard.toml"));
         assert_eq!(code(output.status), 2, "{output:?}");
         assert!(errors(&output).contains("`standard input`"), "{output:?}");
     }
@@ -422,7 +414,7 @@ fn pipes_and_devices_are_refused_at_once() {
     }
     let status = bench.report(&["sweep", "status", "--folder", "sw", "--json"]);
     assert_eq!(status["unusable"][0]["file"], "sw/shard-9.csv");
-    let output = shell(&bench, "timeout 10 $P run - </dev/zero");
+    let output = bench.shell("timeout 10 $P run - </dev/zero");
     assert_eq!(code(output.status), 2, "{output:?}");
     assert!(errors(&output).contains("holds more than"), "{output:?}");
 }
@@ -520,7 +512,7 @@ fn a_file_size_limit_leaves_no_file_of_a_run() {
     for kib in [kib, kib / 2, kib / 8, 1] {
         let line =
             format!("ulimit -f {kib}; $P run edge --set run.duration_s=0.6 --csv out/run.csv");
-        let output = shell(&bench, &line);
+        let output = bench.shell(&line);
         assert_eq!(code(output.status), 4, "{kib}: {output:?}");
         assert_eq!(bench.files(), [""; 0], "{kib} KiB");
     }
@@ -529,7 +521,7 @@ fn a_file_size_limit_leaves_no_file_of_a_run() {
         "man manual".to_owned(),
         format!("{STUDY} --csv s.csv --svg s.svg"),
     ] {
-        let output = shell(&bench, &format!("ulimit -f 1; $P {line}"));
+        let output = bench.shell(&format!("ulimit -f 1; $P {line}"));
         assert_eq!(code(output.status), 4, "{line}: {output:?}");
         assert_eq!(bench.files(), [""; 0], "{line}");
     }
@@ -548,13 +540,10 @@ fn a_run_that_fails_leaves_no_new_folder() {
 fn help_that_cannot_be_written_is_an_error() {
     let bench = Bench::new("help");
     for line in ["--help", "--version", "run --help", "study bifurcation -h"] {
-        let full = shell(&bench, &format!("$P {line} >/dev/full"));
+        let full = bench.shell(&format!("$P {line} >/dev/full"));
         assert_eq!(code(full.status), 4, "{line}: {full:?}");
         assert!(errors(&full).contains("stdout"), "{line}: {full:?}");
-        let unread = shell(
-            &bench,
-            &format!("$P {line} | true; exit ${{PIPESTATUS[0]}}"),
-        );
+        let unread = bench.shell(&format!("$P {line} | true; exit ${{PIPESTATUS[0]}}"));
         assert_eq!(code(unread.status), 0, "{line}: {unread:?}");
         assert_eq!(code(run(&bench, line).status), 0, "{line}");
     }

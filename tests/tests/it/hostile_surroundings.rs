@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 use nix::sys::signal::Signal;
 use nix::sys::stat::Mode;
 use nix::unistd::mkfifo;
-use painleve_tests::{Bench, child_of, code, errors, is_running, program, signal};
+use painleve_tests::{Bench, child_of, code, errors, is_running, signal};
 use serde_json::Value;
 
 const SOON: Duration = Duration::from_secs(5);
@@ -22,41 +22,27 @@ const SHORT: [&str; 5] = [
     "--json",
 ];
 
-/// Runs a shell command in which `$P` is the program and returns its output.
-#[allow(clippy::unwrap_used)]
-fn shell(bench: &Bench, line: &str) -> std::process::Output {
-    Command::new("bash")
-        .args(["-c", line])
-        .env("P", program())
-        .current_dir(bench.path(""))
-        .output()
-        .unwrap()
-}
-
 #[test]
 fn a_closed_pipe_is_not_an_error_but_a_full_disk_is() {
     let bench = Bench::new("stdout");
     for arguments in ["scenarios", "run --set run.duration_s=0.05 --json"] {
-        let unread = shell(
-            &bench,
-            &format!("$P {arguments} | true; exit ${{PIPESTATUS[0]}}"),
-        );
+        let unread = bench.shell(&format!("$P {arguments} | true; exit ${{PIPESTATUS[0]}}"));
         assert_eq!(code(unread.status), 0, "{arguments}: {unread:?}");
         assert_eq!(errors(&unread), "", "{arguments}");
-        let full = shell(&bench, &format!("$P {arguments} > /dev/full"));
+        let full = bench.shell(&format!("$P {arguments} > /dev/full"));
         assert_eq!(code(full.status), 4, "{arguments}: {full:?}");
         assert!(errors(&full).contains("stdout"), "{full:?}");
     }
     // An unwritable log must not end a run.
     let line = format!("$P run --pacing realtime {} 2>/dev/full", SHORT.join(" "));
-    let unlogged = shell(&bench, &line);
+    let unlogged = bench.shell(&line);
     assert_eq!(code(unlogged.status), 0, "{unlogged:?}");
 }
 
 #[test]
 fn a_file_size_limit_is_reported_like_a_full_disk() {
     let bench = Bench::new("fsize");
-    let output = shell(&bench, "ulimit -f 64; $P run --no-plot");
+    let output = bench.shell("ulimit -f 64; $P run --no-plot");
     assert_eq!(code(output.status), 4, "{output:?}");
     assert_eq!(errors(&output).trim().lines().count(), 1, "{output:?}");
     assert!(errors(&output).contains("run.mcap"), "{output:?}");

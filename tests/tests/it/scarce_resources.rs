@@ -89,10 +89,7 @@ fn what_the_system_refuses_is_named_with_its_remedy() {
         ("-f 4", "raise `ulimit -f`"),
         ("-n 16", "raise `ulimit -n`"),
     ] {
-        let output = shell(
-            &bench,
-            &format!("ulimit {limit}; $P run --no-record {SHORT}"),
-        );
+        let output = bench.shell(&format!("ulimit {limit}; $P run --no-record {SHORT}"));
         assert_reported(&output, 3, part);
     }
     let line = format!(
@@ -182,18 +179,10 @@ fn memory_refused_to_a_new_thread_ends_a_run_with_one_message() {
     }
 }
 
-/// Runs a shell command and returns the report of its run.
-#[allow(clippy::unwrap_used)]
-fn shell(bench: &Bench, line: &str) -> Output {
-    let mut shell = Command::new("bash");
-    shell.args(["-c", line]).env("P", program());
-    shell.current_dir(bench.path("")).output().unwrap()
-}
-
 #[test]
 fn closed_streams_do_not_disturb_a_run() {
     let bench = Bench::new("closed");
-    let output = shell(&bench, &format!("$P run {SHORT} <&- >&- 2>&-"));
+    let output = bench.shell(&format!("$P run {SHORT} <&- >&- 2>&-"));
     assert_eq!(code(output.status), 0, "{output:?}");
     // No output that was meant for a stream is in a file.
     let record = std::fs::read(bench.path("out/run.mcap")).unwrap();
@@ -210,7 +199,7 @@ fn one_core_and_a_busy_machine_give_the_same_bits() {
         let report: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
         report["log_hash"].clone()
     };
-    let idle = shell(&bench, &run);
+    let idle = bench.shell(&run);
     let over = AtomicBool::new(false);
     let (busy, one_core) = std::thread::scope(|scope| {
         for _ in 0..2 * std::thread::available_parallelism().map_or(2, usize::from) {
@@ -221,8 +210,8 @@ fn one_core_and_a_busy_machine_give_the_same_bits() {
             });
         }
         let outputs = (
-            shell(&bench, &run),
-            shell(&bench, &format!("taskset -c 0 {run}")),
+            bench.shell(&run),
+            bench.shell(&format!("taskset -c 0 {run}")),
         );
         over.store(true, Ordering::Relaxed);
         outputs
