@@ -110,21 +110,8 @@ impl SerialLine {
     /// # Panics
     /// If QEMU cannot be started, or its image does not answer.
     pub fn start_board(&self) -> SerialBoard {
-        let mut command = Command::new("qemu-system-arm");
-        command
-            .args(["-machine", "netduinoplus2", "-display", "none"])
-            .args(["-monitor", "none", "-nodefaults"])
-            .args(["-semihosting-config", "enable=on,target=native"])
-            .arg("-chardev")
-            .arg(format!("serial,id=line,path={}", self.board_port.display()))
-            // 64 ns per instruction, however busy the machine is, so no tick takes longer. While it
-            // waits, the board follows the host's clock.
-            .args(["-icount", "shift=6,sleep=on"])
-            .args(["-serial", "chardev:line", "-kernel"])
-            .arg(image())
-            .stdin(Stdio::null())
-            .stdout(Stdio::null());
-        let child = end_with_parent(&mut command, Signal::SIGKILL).spawn();
+        let device = format!("serial,id=line,path={}", self.board_port.display());
+        let child = emulator(&device).stdout(Stdio::null()).spawn();
         let board = SerialBoard(Guarded::new(
             child.unwrap_or_else(|error| panic!("cannot start QEMU: {error}")),
         ));
@@ -141,6 +128,25 @@ impl SerialLine {
         assert!((0..20).any(|_| answers()), "the board says nothing");
         board
     }
+}
+
+/// Returns the command that runs the image in QEMU, with its serial line at the character device `line`, and ends with the
+/// thread that starts it.
+pub fn emulator(device: &str) -> Command {
+    let mut command = Command::new("qemu-system-arm");
+    command
+        .args(["-machine", "netduinoplus2", "-display", "none"])
+        .args(["-monitor", "none", "-nodefaults"])
+        .args(["-semihosting-config", "enable=on,target=native"])
+        .args(["-chardev", device, "-serial", "chardev:line"])
+        // 64 ns per instruction, however busy the machine is, so no tick takes longer. While it
+        // waits, the board follows the host's clock.
+        .args(["-icount", "shift=6,sleep=on"])
+        .arg("-kernel")
+        .arg(image())
+        .stdin(Stdio::null());
+    end_with_parent(&mut command, Signal::SIGKILL);
+    command
 }
 
 /// An emulated board on a line; disconnected when dropped.
@@ -161,7 +167,6 @@ impl Drop for SerialLine {
     }
 }
 
-/// A pseudo-terminal that passes every byte as it is: our end, the other end, its name.
 /// A pseudo-terminal without processing: its near end, its far end kept open, the far end's path.
 ///
 /// # Panics

@@ -5,11 +5,12 @@ use std::fs::{File, OpenOptions};
 use std::io::{self, BufRead, BufReader};
 use std::os::fd::AsFd;
 use std::path::Path;
-use std::process::{Child, Command, Stdio};
+use std::process::{Child, Stdio};
 
 use clap::ValueEnum;
 use nix::fcntl::OFlag;
 use nix::sys::termios::{SetArg, cfmakeraw, tcgetattr, tcsetattr};
+use painleve_tests::line::emulator;
 use rustix::termios::ioctl_tiocnxcl;
 use serde_json::Value;
 
@@ -106,15 +107,7 @@ struct SerialBoard {
 
 impl SerialBoard {
     fn start() -> io::Result<Self> {
-        let mut emulator = Command::new(EMULATOR)
-            .args(["-machine", "netduinoplus2", "-display", "none"])
-            .args(["-monitor", "none", "-nodefaults"])
-            .args(["-semihosting-config", "enable=on,target=native"])
-            .args(["-icount", "shift=6,sleep=on"])
-            .args(["-chardev", "pty,id=line", "-serial", "chardev:line"])
-            .arg("-kernel")
-            .arg(painleve_tests::image())
-            .stdin(Stdio::null())
+        let mut emulator = emulator("pty,id=line")
             .stdout(Stdio::piped())
             .stderr(Stdio::null())
             .spawn()?;
