@@ -182,10 +182,7 @@ impl Sink for Drawing {
 
 /// Runs a scenario in this process.
 fn simulate(scenario: &Scenario, monitor: &mut impl Monitor) -> Result<LoopResult, CommandError> {
-    let range = |source| ScenarioError::Range {
-        origin: scenario.name.clone(),
-        source,
-    };
+    let range = |source| ScenarioError::range(&scenario.name, source);
     let simulation = Simulation::new(scenario).map_err(range)?;
     let host = InProcess::new(&scenario.controller_configuration()).map_err(range)?;
     let mut running = ClosedLoop::new(simulation, host);

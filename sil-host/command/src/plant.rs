@@ -123,10 +123,8 @@ fn simulate(
     interrupt: &Interrupt,
     output: &mut Output,
 ) -> Result<RunReport, CommandError> {
-    let simulation = Simulation::new(scenario).map_err(|source| ScenarioError::Range {
-        origin: scenario.name.clone(),
-        source,
-    })?;
+    let range = |source| ScenarioError::range(&scenario.name, source);
+    let simulation = Simulation::new(scenario).map_err(range)?;
     let pacing = arguments.scenario.pacing;
     let session = Session::new(scenario, pacing).map_err(ProcessError::Unsendable)?;
     let mut end = PlantEnd::create(&arguments.bus, arguments.pair, &session, interrupt)?;

@@ -158,7 +158,7 @@ fn on_board<B: ConnectedBoard>(
 
 fn by_the_clock(scenario: &Scenario, interrupt: &Interrupt) -> Result<TimingReport, CommandError> {
     let configuration = scenario.controller_configuration();
-    let range = |source| out_of_range(scenario, source);
+    let range = |source| ScenarioError::range(&scenario.name, source);
     let controller = InProcess::new(&configuration).map_err(range)?;
     let metronome = Metronome::start(controller, &configuration)?;
     let (lateness_ns, missed_deadlines) = drive(scenario, metronome, interrupt)?.finish();
@@ -176,7 +176,8 @@ fn drive<H: ControllerHost>(
     host: H,
     interrupt: &Interrupt,
 ) -> Result<H, CommandError> {
-    let simulation = Simulation::new(scenario).map_err(|source| out_of_range(scenario, source))?;
+    let range = |source| ScenarioError::range(&scenario.name, source);
+    let simulation = Simulation::new(scenario).map_err(range)?;
     let mut closed_loop = ClosedLoop::new(simulation, host);
     for _ in 0..scenario.run.ticks() {
         closed_loop.tick(&mut ())?;
@@ -185,11 +186,4 @@ fn drive<H: ControllerHost>(
         }
     }
     Ok(closed_loop.finish().1)
-}
-
-fn out_of_range(scenario: &Scenario, source: painleve_shared::range::OutOfRange) -> ScenarioError {
-    ScenarioError::Range {
-        origin: scenario.name.clone(),
-        source,
-    }
 }

@@ -172,10 +172,7 @@ struct Drive {
 
 impl Drive {
     fn open(arguments: &DriveArguments, scenario: &Scenario) -> Result<Self, CommandError> {
-        let range = |source| ScenarioError::Range {
-            origin: scenario.name.clone(),
-            source,
-        };
+        let range = |source| ScenarioError::range(&scenario.name, source);
         let configuration = scenario.controller_configuration();
         let measured = Measured::new(&configuration).map_err(range)?;
         let source = if arguments.dry_run {
@@ -311,10 +308,8 @@ pub(crate) fn check_rate(scenario: &Scenario) -> Result<(), ScenarioError> {
         SensorParts::First | SensorParts::Second => one,
     };
     let hz = f64::from(scenario.run.tick_hz);
-    range::check("run.tick_hz", hz, 1.0, fastest_hz).map_err(|source| ScenarioError::Range {
-        origin: scenario.name.clone(),
-        source,
-    })
+    range::check("run.tick_hz", hz, 1.0, fastest_hz)
+        .map_err(|source| ScenarioError::range(&scenario.name, source))
 }
 
 /// Tells the operator of an arm with one sensor on each channel what the board cannot detect within two ticks.

@@ -245,7 +245,7 @@ impl Live {
         let running = at_once(&self.running);
         if running.controller != self.running.controller {
             let controller = Controller::new(&running.controller_configuration());
-            let range = |source| in_run(&running, source).to_string();
+            let range = |source| ScenarioError::range(&running.name, source).to_string();
             self.closed_loop.host_mut().controller = controller.map_err(range)?;
         }
         if running.belt != self.running.belt {
@@ -335,16 +335,9 @@ impl Live {
     }
 }
 
-fn in_run(scenario: &Scenario, source: painleve_shared::OutOfRange) -> CommandError {
-    CommandError::Scenario(ScenarioError::Range {
-        origin: scenario.name.clone(),
-        source,
-    })
-}
-
 /// Starts plant and controller of a scenario.
 fn start(scenario: &Scenario, viewers: &Viewers) -> Result<ClosedLoop<Host>, CommandError> {
-    let range = |source| in_run(scenario, source);
+    let range = |source| ScenarioError::range(&scenario.name, source);
     let controller = Controller::new(&scenario.controller_configuration()).map_err(range)?;
     Ok(ClosedLoop::new(
         Simulation::new(scenario).map_err(range)?,

@@ -80,6 +80,16 @@ pub enum ScenarioError {
     },
 }
 
+impl ScenarioError {
+    /// A value of a scenario that is out of range.
+    pub fn range(scenario: &str, source: OutOfRange) -> Self {
+        Self::Range {
+            origin: scenario.into(),
+            source,
+        }
+    }
+}
+
 /// What is wrong with a key.
 #[derive(Debug, thiserror::Error)]
 pub enum KeyError {
