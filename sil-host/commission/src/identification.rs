@@ -404,7 +404,7 @@ impl Found {
         let tick_hz = f64::from(scenario.run.tick_hz);
         Ok(Self {
             joints: Joints::of(slides, geometry, &known, tick_hz, &limits)?,
-            ripple_m_s2: ripple_m_s2(slides, geometry, &Arm::new(known)?, tick_hz),
+            ripple_m_s2: ripple_m_s2(slides, geometry, &Arm::new(known)?, tick_hz, &limits),
             identified,
             prior,
         })
@@ -468,16 +468,17 @@ impl Found {
 }
 
 /// Returns the ripple of [`Found::ripple_m_s2`].
-fn ripple_m_s2(slides: &[Slide], geometry: &Parameters, arm: &Arm<f64>, tick_hz: f64) -> f64 {
+fn ripple_m_s2(
+    slides: &[Slide],
+    geometry: &Parameters,
+    arm: &Arm<f64>,
+    tick_hz: f64,
+    limits: &Limits,
+) -> f64 {
     let mean_ticks = MEAN_S * tick_hz;
     let (mut sum, mut count) = (0.0, 0_u32);
     for slide in slides {
-        let touching = || {
-            slide
-                .readings
-                .iter()
-                .filter(|it| it.force_n[1] >= CONTACT_N)
-        };
+        let touching = || slide.on_belt(limits);
         let Some(first) = touching().next() else {
             continue;
         };
@@ -547,7 +548,7 @@ mod tests {
                 readings: readings.collect(),
                 whole: 3000,
             };
-            super::ripple_m_s2(&[slide], &geometry, &arm, 1000.0)
+            super::ripple_m_s2(&[slide], &geometry, &arm, 1000.0, &limits(&scenario))
         };
         assert!(ripple_m_s2(0.0, 1) < 1e-9);
         let rippling = ripple_m_s2(1.0, 1);

@@ -44,14 +44,9 @@ use painleve_shared::{Arm, ArmParameters, LinkMotion, OutOfRange, Posture};
 pub use mistake::{Deviation, Mistake};
 use readings::Session;
 
-/// Names of the joints in messages, by index.
-pub(crate) const JOINT_NAMES: [&str; 2] = ["joint 1", "the elbow"];
-
 /// Raw readings of one control tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct RawReadings {
-    /// Control tick; wraps.
-    pub tick: u32,
     /// Encoders of θ1 and of the elbow; out of range for a missing reading.
     pub joints: [EncoderCounts; 2],
     /// f_t and f_n; out of range for a missing reading.

@@ -1,6 +1,6 @@
 //! Deviations from the scenario, and mistakes that no setting can describe, each in one sentence.
 
-use crate::JOINT_NAMES;
+use painleve_identify::parameters::JOINT_NAMES;
 
 /// A deviation from the scenario that the measured settings correct.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]

@@ -218,23 +218,16 @@ impl Fit {
         largest
     }
 
-    /// Returns the covariance that there would be with further slides.
-    pub(crate) fn covariance_with(
-        &self,
-        points: &Points,
-        prior: &Prior,
-        ranges: &[Range],
-    ) -> Square {
+    /// Returns the covariance that there would be with a further slide.
+    pub(crate) fn covariance_with(&self, points: &Points, prior: &Prior, range: Range) -> Square {
         let mut information = self.information;
-        for range in ranges {
-            for tip_t_m in range.places_m() {
-                let Some(place) = Place::on_belt(&self.parameters, range.posture, tip_t_m) else {
-                    continue;
-                };
-                let deviation_m = self.noise * points.deviation_m(&place);
-                let row = place.depth_by.component_mul(&prior.deviations) / deviation_m;
-                information.ger(1.0, &row, &row, 1.0);
-            }
+        for tip_t_m in range.places_m() {
+            let Some(place) = Place::on_belt(&self.parameters, range.posture, tip_t_m) else {
+                continue;
+            };
+            let deviation_m = self.noise * points.deviation_m(&place);
+            let row = place.depth_by.component_mul(&prior.deviations) / deviation_m;
+            information.ger(1.0, &row, &row, 1.0);
         }
         covariance(&information, prior)
     }

@@ -60,7 +60,7 @@ pub struct Slide {
 
 impl Slide {
     /// Returns the readings with the tip on the belt.
-    pub(crate) fn on_belt(&self, limits: &Limits) -> impl Iterator<Item = &Reading> {
+    pub fn on_belt(&self, limits: &Limits) -> impl Iterator<Item = &Reading> {
         let readings = self.readings.iter();
         readings.filter(|it| it.force_n[1] >= limits.contact_n)
     }

@@ -1,7 +1,9 @@
 //! The parameters of an arm's geometry, and what is known of them beforehand.
 
 use nalgebra::SVector;
-use serde::Serialize;
+
+/// Names of the joints in messages, by index.
+pub const JOINT_NAMES: [&str; 2] = ["joint 1", "the elbow"];
 
 /// Number of parameters.
 pub const COUNT: usize = 13;
@@ -10,8 +12,7 @@ pub const COUNT: usize = 13;
 pub type Values = SVector<f64, COUNT>;
 
 /// One parameter.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Parameter {
     /// Constant that is added to an encoder's angle, rad.
     Zero(usize),
@@ -83,15 +84,13 @@ impl Parameter {
 
 impl core::fmt::Display for Parameter {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        let encoder = |joint: usize| ["joint 1", "the elbow"][joint];
+        let mut of_joint = |what: &str, joint: usize| write!(f, "{what} of {}", JOINT_NAMES[joint]);
         match *self {
-            Self::Zero(joint) => write!(f, "zero of the encoder of {}", encoder(joint)),
-            Self::Sine(joint) => write!(f, "sine of the error of {}", encoder(joint)),
-            Self::Cosine(joint) => write!(f, "cosine of the error of {}", encoder(joint)),
-            Self::SecondSine(joint) => write!(f, "second sine of the error of {}", encoder(joint)),
-            Self::SecondCosine(joint) => {
-                write!(f, "second cosine of the error of {}", encoder(joint))
-            }
+            Self::Zero(joint) => of_joint("zero of the encoder", joint),
+            Self::Sine(joint) => of_joint("sine of the error", joint),
+            Self::Cosine(joint) => of_joint("cosine of the error", joint),
+            Self::SecondSine(joint) => of_joint("second sine of the error", joint),
+            Self::SecondCosine(joint) => of_joint("second cosine of the error", joint),
             Self::Length => f.write_str("length of link 1"),
             Self::Ratio => f.write_str("length of link 2 over that of link 1"),
             Self::Height => f.write_str("height of joint 1 over the belt"),

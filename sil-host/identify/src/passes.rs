@@ -9,7 +9,7 @@
 
 use painleve_shared::Posture;
 
-use crate::geometry::{Place, Range};
+use crate::geometry::{Place, Range, joint_rad};
 use crate::parameters::{Parameters, Prior};
 use crate::{Limits, Refusal, Slide};
 
@@ -203,30 +203,25 @@ impl Points {
 
     /// Returns the stretch of each slide, with its posture by the elbow.
     pub fn ranges(&self, parameters: &Parameters) -> Vec<Range> {
-        let slides = 0..self.postures.len();
         let range = |slide| {
-            let of = self.points.iter().filter(|point| point.slide == slide);
-            let mut range: Option<Range> = None;
-            let mut elbow = 0.0;
-            for point in of {
+            let mut range = Range {
+                posture: Posture::ElbowDown,
+                from_m: f64::INFINITY,
+                to_m: f64::NEG_INFINITY,
+            };
+            let mut elbow_rad = 0.0;
+            for point in self.points.iter().filter(|point| point.slide == slide) {
                 let tip_t_m = Place::at(parameters, point.encoders_rad).tip_t_m;
-                let found = range.get_or_insert(Range {
-                    posture: Posture::ElbowDown,
-                    from_m: tip_t_m,
-                    to_m: tip_t_m,
-                });
-                found.from_m = found.from_m.min(tip_t_m);
-                found.to_m = found.to_m.max(tip_t_m);
-                elbow += crate::geometry::joint_rad(parameters, 1, point.encoders_rad[1]);
-                if elbow > 0.0 {
-                    found.posture = Posture::ElbowUp;
-                } else {
-                    found.posture = Posture::ElbowDown;
-                }
+                range.from_m = range.from_m.min(tip_t_m);
+                range.to_m = range.to_m.max(tip_t_m);
+                elbow_rad += joint_rad(parameters, 1, point.encoders_rad[1]);
+            }
+            if elbow_rad > 0.0 {
+                range.posture = Posture::ElbowUp;
             }
             range
         };
-        slides.filter_map(range).collect()
+        (0..self.postures.len()).map(range).collect()
     }
 
     /// Returns the same with other angles.

@@ -3,7 +3,7 @@
 use painleve_shared::Posture;
 
 use crate::geometry::Range;
-use crate::parameters::Parameter;
+use crate::parameters::{JOINT_NAMES, Parameter};
 
 /// A motion that is missing.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -93,7 +93,7 @@ pub enum Refusal {
     /// An encoder counts backwards.
     #[error(
         "encoder of {}: counts in the other direction than the scenario says (converters.mounting.encoder_reversed)",
-        ["joint 1", "the elbow"][*.joint]
+        JOINT_NAMES[*.joint]
     )]
     EncoderReversed {
         /// Index of the joint.
@@ -102,7 +102,7 @@ pub enum Refusal {
     /// An encoder slipped on its shaft.
     #[error(
         "encoder of {}: slipped on its shaft by {slipped_deg:.2}° in slide {}; fasten its magnet, and slide again",
-        ["joint 1", "the elbow"][*.joint],
+        JOINT_NAMES[*.joint],
         .slide + 1
     )]
     Slipped {

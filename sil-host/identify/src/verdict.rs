@@ -193,7 +193,7 @@ pub(crate) fn check_observed(
     }
     let mut least: Option<(f64, Missing)> = None;
     for missing in candidates {
-        let covariance = fit.covariance_with(points, prior, &[missing.range]);
+        let covariance = fit.covariance_with(points, prior, missing.range);
         let then_m = deviation_m(&covariance);
         if least.as_ref().is_none_or(|(least_m, _)| then_m < *least_m) {
             least = Some((then_m, missing));

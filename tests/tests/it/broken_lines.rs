@@ -144,6 +144,7 @@ impl BoardEnd {
         let mut torques = [TorqueCounts(0); 2];
         let mut answer = ActuatorFrame::default();
         let mut due = Instant::now();
+        let mut tick = 0_u32;
         while !self.state.is_over.load(Ordering::SeqCst) && self.intact > 0 {
             for byte in self.received() {
                 let Some(message) = inbox.push(byte) else {
@@ -180,13 +181,14 @@ impl BoardEnd {
             if is_running {
                 let raw = arm.lock().unwrap().exchange(torques).unwrap();
                 let sensor = SensorFrame {
-                    tick: raw.tick,
-                    sequence: raw.tick,
+                    tick,
+                    sequence: tick,
                     joints: raw.joints,
                     tangential_force: raw.forces[0],
                     normal_force: raw.forces[1],
                     ..SensorFrame::default()
                 };
+                tick = tick.wrapping_add(1);
                 let elapsed = 0;
                 let is_whole = self.send(&Response::Tick {
                     sensor,

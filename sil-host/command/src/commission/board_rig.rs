@@ -216,7 +216,6 @@ impl Rig for BoardRig {
                 return Err(BoardRigError::Off);
             }
             return Ok(RawReadings {
-                tick: sensor.tick,
                 joints: sensor.joints,
                 forces: [sensor.tangential_force, sensor.normal_force],
             });

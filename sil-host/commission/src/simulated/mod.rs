@@ -59,7 +59,6 @@ pub struct SimulatedRig {
     held_rad: Option<LinkMotion<f64>>,
     simulation: Option<Simulation>,
     stages_are_on: bool,
-    tick: u32,
     generator: Pcg64,
 }
 
@@ -88,7 +87,6 @@ impl SimulatedRig {
             held_rad: Some(LinkMotion::zeros()),
             simulation: None,
             stages_are_on: false,
-            tick: 0,
             generator: Pcg64::seed_from_u64(seed),
         }
     }
@@ -132,7 +130,6 @@ impl SimulatedRig {
         let forces = forces.map(|it| ForceCounts(it.0 + noise().0));
         let force_scale = self.actual.converters.scales().force;
         Ok(RawReadings {
-            tick: self.tick,
             joints: self.wiring.encoders(&self.encoders, joints),
             forces: self.wiring.forces(&force_scale, forces),
         })
@@ -158,7 +155,6 @@ impl Rig for SimulatedRig {
 
     fn exchange(&mut self, torques: [TorqueCounts; 2]) -> Result<RawReadings, SimulatedError> {
         let readings = self.readings()?;
-        self.tick = self.tick.wrapping_add(1);
         let torques = if self.stages_are_on {
             let torque_scale = self.actual.converters.scales().torque;
             self.wiring.torques(&torque_scale, torques)
