@@ -261,8 +261,8 @@ fn noise(points: &Points, parameters: &Parameters) -> f64 {
     libm::sqrt(variance * sharing(&off)).max(LEAST_NOISE)
 }
 
-/// Returns the number of neighbours in a series that share an error: twice the sum of its correlations, until they have gone
-/// (Geyer: initial positive sequence).
+/// Returns the number of neighbours in a series that share an error: one and twice the sum of its correlations, up to the first
+/// below a twentieth. Those behind it are noise.
 pub(crate) fn sharing(off: &[f64]) -> f64 {
     let count = off.len();
     let power = |lag: usize| {

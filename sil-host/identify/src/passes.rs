@@ -136,7 +136,8 @@ impl Points {
             it.encoders_rad.iter().all(|angle| angle.is_finite())
                 && it.force_n.iter().all(|force_n| force_n.is_finite())
         };
-        if let Some(tick) = of.readings.iter().position(|it| !is_finite(&it)) {
+        if let Some(reading) = of.readings.iter().find(|it| !is_finite(it)) {
+            let tick = reading.tick;
             return Err(Refusal::NotFinite { slide, tick });
         }
         let share = of.share_on_belt(limits);

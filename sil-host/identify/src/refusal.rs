@@ -51,8 +51,8 @@ pub enum Refusal {
     NotFinite {
         /// Index of the slide.
         slide: usize,
-        /// Index of the reading.
-        tick: usize,
+        /// Control tick of the reading.
+        tick: u32,
     },
     /// The tip was in the air.
     #[error(
@@ -88,7 +88,7 @@ pub enum Refusal {
         found: Posture,
     },
     /// The encoders are exchanged.
-    #[error("encoders: exchanged with each other; swap their select lines, or their magnets")]
+    #[error("encoders: exchanged with each other; swap their select lines")]
     EncodersSwapped,
     /// An encoder counts backwards.
     #[error(

@@ -101,7 +101,7 @@ fn sentences(found: &Found) -> [String; 3] {
             identified.readings
         ),
         format!(
-            "Its position is known to {:.2} mm plus {:.2} %, as link 1 has been measured; its distance from the edges to {:.2} mm \
+            "Its position is known to {:.2} mm plus {:.2} % for the length of link 1; its distance from the edges to {:.2} mm \
              (before: {:.1} mm).",
             1e3 * identified.place_deviation_m,
             100.0 * length_deviation,
