@@ -207,6 +207,15 @@ pub enum Mistake {
         /// Gear ratio that would explain it.
         gear_ratio: f64,
     },
+    /// The scenario of second sensors has not been commissioned with the first ones.
+    #[error(
+        "torque stage of {}: turns its joint in the other direction than the scenario says; commission the first sensors first, and give the file that this writes",
+        JOINT_NAMES[*.joint]
+    )]
+    NotCommissioned {
+        /// Index of the joint.
+        joint: usize,
+    },
     /// The forces of a torque are not those of the model.
     #[error(
         "torque stage of {}: its torque changes f_t and f_n in a ratio that no exchange or change of sign explains; check the arm's parameters and the force cell",

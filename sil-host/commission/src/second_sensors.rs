@@ -6,7 +6,7 @@
 use painleve_plant::scenario::Scenario;
 use painleve_shared::mounting::{Mounting, SensorParts};
 
-use crate::{Commissioned, Deviation};
+use crate::{Commissioned, Deviation, Mistake};
 
 /// Returns a scenario whose first sensors are the second ones of this. The correction is that of the first encoders.
 pub fn in_place_of_first(scenario: &Scenario) -> Scenario {
@@ -33,7 +33,16 @@ pub struct SecondSensors {
 
 impl SecondSensors {
     /// Takes what was found with the second sensors [in place of the first](in_place_of_first) ones of `scenario`.
-    pub fn new(found: &Commissioned, scenario: &Scenario) -> Self {
+    ///
+    /// # Errors
+    /// [`Mistake::NotCommissioned`] if a torque stage turns its joint in another direction than the scenario says: the first
+    /// sensors' directions are no better.
+    pub fn new(found: &Commissioned, scenario: &Scenario) -> Result<Self, Mistake> {
+        for deviation in &found.deviations {
+            if let Deviation::StageDirection { joint } = *deviation {
+                return Err(Mistake::NotCommissioned { joint });
+            }
+        }
         let Mounting {
             encoder_reversed,
             force_reversed,
@@ -48,11 +57,11 @@ impl SecondSensors {
         let forces = different(force_reversed, expected.second_force_reversed)
             .map(|axis| Deviation::SecondForceDirection { axis });
         let deviations = encoders.chain(forces).collect();
-        Self {
+        Ok(Self {
             encoder_reversed,
             force_reversed,
             deviations,
-        }
+        })
     }
 
     /// Returns the scenario with the measured directions, and with both sensors of each channel in use.
@@ -88,7 +97,7 @@ mod tests {
             let mut rig = SimulatedRig::new(&in_place_of_first(&actual), None, number.into());
             let expected = Expected::new(&in_place_of_first(&scenario), 1.0).unwrap();
             let found = commission(&mut rig, &expected).unwrap();
-            let second = SecondSensors::new(&found, &scenario);
+            let second = SecondSensors::new(&found, &scenario).unwrap();
             assert_eq!(second.deviations.len() as u32, number.count_ones());
             let corrected = second.applied_to(&scenario).converters.mounting;
             let actual = actual.converters.mounting;
@@ -102,5 +111,19 @@ mod tests {
             );
             assert_eq!(corrected.encoder_reversed, [false; 2]);
         }
+    }
+
+    #[test]
+    fn an_arm_whose_stages_are_not_as_described_is_refused() {
+        let scenario = Scenario::load(built_in::DEFAULT, &[]).unwrap();
+        let mut actual = in_place_of_first(&scenario);
+        actual.converters.mounting.stage_reversed = [false, true];
+        let mut rig = SimulatedRig::new(&actual, None, 1);
+        let expected = Expected::new(&in_place_of_first(&scenario), 1.0).unwrap();
+        let found = commission(&mut rig, &expected).unwrap();
+        assert_eq!(
+            SecondSensors::new(&found, &scenario),
+            Err(Mistake::NotCommissioned { joint: 1 })
+        );
     }
 }

@@ -113,7 +113,10 @@ pub fn run(arguments: &CommissionArguments) -> Result<(), CommandError> {
         CommissionError::Range(source) => range(source),
     })?;
     let (corrected, deviations) = if arguments.second_sensors {
-        let found = SecondSensors::new(&commissioned, &as_written);
+        let found = SecondSensors::new(&commissioned, &as_written).map_err(|mistake| {
+            warn_of_earlier(&[&arguments.output]);
+            CommandError::Mounting(mistake)
+        })?;
         (found.applied_to(&as_written), found.deviations)
     } else {
         let corrected = commissioned.applied_to(&as_written).map_err(range)?;
@@ -177,13 +180,18 @@ fn report(
     deviations: &[Deviation],
     friction: Option<f64>,
 ) -> Result<(), CommandError> {
+    // The file of second sensors keeps the friction that the first ones have shown.
+    let writes_friction = !arguments.second_sensors;
     if arguments.json {
         let corrections = deviations.iter().map(ToString::to_string);
-        return say(json!({
+        let mut object = json!({
             "corrections": corrections.collect::<Vec<_>>(),
-            "friction": friction,
             "output": arguments.output.display().to_string(),
-        }));
+        });
+        if writes_friction {
+            object["friction"] = friction.into();
+        }
+        return say(object);
     }
     for deviation in deviations {
         say(format_args!("corrected: {deviation}"))?;
@@ -192,6 +200,7 @@ fn report(
         say("the scenario describes how the arm is mounted")?;
     }
     match friction {
+        _ if !writes_friction => {}
         Some(friction) => say(format_args!(
             "friction of the tip on the belt: {friction:.2}"
         ))?,
