@@ -165,24 +165,35 @@ pub(crate) fn terms(correction: &mut EncoderCorrection) -> [(OfJoint, &mut [f32;
     ]
 }
 
-/// Lets the governor of an arm that has never been identified keep a distance for what a drawing, a plumb line and a
-/// tape leave unknown.
+/// Forgets what slides have shown, and lets the governor keep a distance for what a drawing, a plumb line and a tape leave
+/// unknown.
 pub(crate) fn suppose_drawn(scenario: &mut Scenario) {
-    if scenario.knowledge == Knowledge::default() {
-        let drawn_m = setting(prior(scenario, &Drawn::default()).tip_deviation_m());
-        scenario.knowledge.source = DRAWN.into();
-        let deviation_m = &mut scenario.controller.estimator.tip_deviation_m;
-        *deviation_m = deviation_m.max(drawn_m);
-    }
+    let told_m = told_m(scenario);
+    let drawn_m = prior(scenario, &Drawn::default()).tip_deviation_m();
+    scenario.controller.estimator.tip_deviation_m = setting(libm::hypot(drawn_m, told_m));
+    scenario.knowledge = Knowledge {
+        source: DRAWN.into(),
+        told_m: rounded(told_m),
+        ..Knowledge::default()
+    };
 }
 
-/// Returns the deviation of the tip that the operator has told, m: for play of the gears, say. A file that has been
-/// commissioned or identified has that in its place.
+/// Returns whether a scenario has never been commissioned or identified.
+pub(crate) fn is_new(scenario: &Scenario) -> bool {
+    let of_new = Knowledge {
+        told_m: scenario.knowledge.told_m,
+        ..Knowledge::default()
+    };
+    scenario.knowledge == of_new
+}
+
+/// Returns the deviation of the tip that the operator has told, m: for play of the gears, say.
 fn told_m(scenario: &Scenario) -> f64 {
-    if scenario.knowledge == Knowledge::default() {
-        f64::from(scenario.controller.estimator.tip_deviation_m)
+    let told_m = scenario.knowledge.told_m;
+    if is_new(scenario) {
+        told_m.max(as_written(scenario.controller.estimator.tip_deviation_m))
     } else {
-        0.0
+        told_m
     }
 }
 
@@ -457,6 +468,7 @@ impl Found {
             link_length_m: [length, rounded(libm::hypot(length, ratio))],
             height_m: deviation(Parameter::Height),
             tip_m: rounded(self.identified.place_deviation_m),
+            told_m: rounded(told_m(scenario)),
             off_line_m: rounded(self.identified.off_line_m[1]),
             ripple_m_s2: rounded(ripple_m_s2),
             coulomb_friction_nm: joints.map(|it| rounded(it.friction_nm.deviation)),
@@ -562,11 +574,20 @@ mod tests {
     }
 
     #[test]
-    fn only_an_arm_of_which_nothing_else_is_known_has_a_told_deviation() {
-        let told = "controller.estimator.tip_deviation_m=0.003".to_owned();
-        let mut scenario = Scenario::default().with_overrides("play", &[told]).unwrap();
-        assert!((told_m(&scenario) - 0.003).abs() < 1e-8);
-        suppose_drawn(&mut scenario);
-        assert_eq!(told_m(&scenario), 0.0);
+    fn a_told_deviation_is_kept_beside_what_is_known() {
+        for key in ["controller.estimator.tip_deviation_m", "knowledge.told_m"] {
+            let told = [format!("{key}=0.003")];
+            let mut scenario = Scenario::default().with_overrides("play", &told).unwrap();
+            assert!(is_new(&scenario) && told_m(&scenario) == 0.003);
+            let mut deviations_m = Vec::new();
+            for _ in 0..2 {
+                suppose_drawn(&mut scenario);
+                assert!(!is_new(&scenario) && told_m(&scenario) == 0.003);
+                deviations_m.push(scenario.controller.estimator.tip_deviation_m);
+            }
+            let drawn_m = prior(&scenario, &Drawn::default()).tip_deviation_m();
+            let expected_m = setting(libm::hypot(drawn_m, 0.003));
+            assert_eq!(deviations_m, [expected_m; 2]);
+        }
     }
 }

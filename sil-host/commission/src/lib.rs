@@ -36,7 +36,7 @@ use painleve_firmware::configuration::Converters;
 use painleve_firmware::estimate::encoder_correction::EncoderCorrection;
 use painleve_plant::decimal::as_written;
 use painleve_plant::mechanics::motion::theta;
-use painleve_plant::scenario::{InitialState, Knowledge, Scenario};
+use painleve_plant::scenario::{InitialState, Scenario};
 use painleve_shared::counts::{EncoderCounts, ForceCounts, TorqueCounts};
 use painleve_shared::mounting::Mounting;
 use painleve_shared::{Arm, ArmParameters, LinkMotion, OutOfRange, Posture};
@@ -234,10 +234,6 @@ impl Commissioned {
         let is_other = directions != self.mounting.encoder_reversed
             || scenario.converters.encoder.offset_counts != self.encoder_offsets
             || self.height_m != assumed_height_m(scenario);
-        if is_other {
-            // Whatever was known is that of the arm as it was.
-            corrected.knowledge = Knowledge::default();
-        }
         corrected.converters.mounting = self.mounting;
         corrected.converters.encoder.offset_counts = self.encoder_offsets;
         corrected.controller.estimator.encoders = self.correction;
@@ -249,7 +245,10 @@ impl Commissioned {
             corrected.belt.friction = friction;
             corrected.controller.friction.first_guess = friction.min(2.0) as f32;
         }
-        identification::suppose_drawn(&mut corrected);
+        // Whatever was known is that of the arm as it was.
+        if is_other || identification::is_new(scenario) {
+            identification::suppose_drawn(&mut corrected);
+        }
         // The file's start must lie on the belt at its new height.
         let arm = Arm::new(corrected.arm)?;
         let tip = arm.tip_m(&painleve_shared::kinematics::Pose::new(&self.rest_rad));

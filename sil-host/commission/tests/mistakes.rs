@@ -5,8 +5,8 @@
 use painleve_commission::simulated::{BuiltInMistake, SimulatedRig, random_arm};
 use painleve_commission::{CommissionError, Commissioned, Expected, commission};
 use painleve_plant::decimal::as_written;
-use painleve_plant::scenario::Scenario;
-use painleve_shared::{Arm, Pose};
+use painleve_plant::scenario::{Knowledge, Scenario};
+use painleve_shared::{Arm, ArmParameters, Pose};
 
 const TORQUE_LIMIT_NM: f64 = 1.0;
 
@@ -248,11 +248,28 @@ fn a_belt_that_has_been_moved_leaves_the_correction_and_takes_what_was_known() {
 fn play_that_the_operator_has_told_is_kept() {
     let told = "controller.estimator.tip_deviation_m=0.05".to_owned();
     let scenario = Scenario::default().with_overrides("play", &[told]).unwrap();
-    let corrected = commissioned(&scenario, None, 1)
-        .unwrap()
-        .applied_to(&scenario)
-        .unwrap();
-    assert_eq!(corrected.controller.estimator.tip_deviation_m, 0.05);
+    let commissioned = commissioned(&scenario, None, 1).unwrap();
+    let corrected = commissioned.applied_to(&scenario).unwrap();
+    assert_eq!(corrected.knowledge.told_m, 0.05);
+    let drawn = commissioned.applied_to(&Scenario::default()).unwrap();
+    let drawn_m = drawn.controller.estimator.tip_deviation_m;
+    let deviation_m = corrected.controller.estimator.tip_deviation_m;
+    assert!((deviation_m - drawn_m.hypot(0.05)).abs() < 1e-6);
+    // Whatever was identified of an arm that has changed is gone.
+    let moved = Scenario {
+        knowledge: Knowledge {
+            off_line_m: 2e-5,
+            ..corrected.knowledge.clone()
+        },
+        arm: ArmParameters {
+            height_m: scenario.arm.height_m + 0.02,
+            ..scenario.arm
+        },
+        ..corrected
+    };
+    let again = commissioned.applied_to(&moved).unwrap();
+    assert_eq!(again.knowledge.told_m, 0.05);
+    assert_eq!(again.controller.estimator.tip_deviation_m, deviation_m);
 }
 
 #[test]
