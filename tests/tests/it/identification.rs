@@ -51,6 +51,30 @@ fn a_rehearsal_writes_what_it_has_found() {
     }
 }
 
+/// A link 1 that was measured later is no change.
+#[test]
+fn an_arm_that_has_changed_since_it_was_identified_is_told() {
+    let bench = Bench::new("identify-again");
+    bench.report(&["identify", "--rehearse", "--seed", "3", "--json"]);
+    let has_changed = |seed: &str, length: &[&str]| {
+        let line = [
+            "identify",
+            "out/identified.toml",
+            "--rehearse",
+            "--output",
+            "out/identified-again.toml",
+            "--seed",
+            seed,
+        ];
+        let again = bench.run(&[&line[..], length].concat());
+        assert!(again.status.success(), "{}", errors(&again));
+        errors(&again).contains("the arm has changed")
+    };
+    assert!(has_changed("4", &[]));
+    assert!(!has_changed("3", &[]));
+    assert!(!has_changed("3", &["--link-1-m", "0.2105"]));
+}
+
 /// Records a slide of an arm with friction that its controller does not know; returns the file.
 fn recorded(bench: &Bench, posture: Posture, name: &str) -> String {
     let overrides = [

@@ -11,13 +11,13 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use painleve_commission::identification::{
-    Found, IdentificationError, identify_arm, identify_slides,
+    Found, IdentificationError, identify_arm, identify_slides, prior,
 };
 use painleve_commission::set_down::{SetDown, advice};
 use painleve_commission::simulated::{GeometryMistake, SimulatedSlides, imperfect};
 use painleve_files::atomic_file::{commit_all, prepare};
-use painleve_identify::Slide;
 use painleve_identify::parameters::Drawn;
+use painleve_identify::{Parameters, Slide};
 use painleve_plant::scenario::{Scenario, ScenarioError, built_in};
 use painleve_process::terminal::{self, warn};
 use painleve_shared::Posture;
@@ -109,6 +109,7 @@ pub fn run(arguments: &IdentifyArguments) -> Result<(), CommandError> {
     let slides = recorded?;
     distinct_files::check(&[("--output", &arguments.output), ("--html", &arguments.html)])?;
     let mut drawn = Drawn::default();
+    let written = prior(&scenario, &drawn).parameters;
     if let Some(length_m) = arguments.link_1_m {
         let mut arm = scenario.controller_configuration().arm;
         arm.link_length_m[0] = length_m as f32;
@@ -118,7 +119,7 @@ pub fn run(arguments: &IdentifyArguments) -> Result<(), CommandError> {
     let found = found(arguments, &slides, &scenario, &drawn);
     let (found, source) =
         found.inspect_err(|_| warn_of_earlier(&[&arguments.output, &arguments.html]))?;
-    warn_of_change(&scenario, &found);
+    warn_of_change(&scenario, &written, &found);
     let identified = found
         .applied_to(&scenario, &source)
         .map_err(|error| range(&arguments.scenario, error))?;
@@ -193,10 +194,11 @@ fn failed<E: std::error::Error>(
     }
 }
 
-/// Warns if an arm that has been identified before is no longer as it was.
-fn warn_of_change(scenario: &Scenario, found: &Found) {
+/// Warns if an arm that has been identified before is no longer as `written` in its scenario. A length that was measured since
+/// is no change of the arm.
+fn warn_of_change(scenario: &Scenario, written: &Parameters, found: &Found) {
     let written_m = scenario.knowledge.off_line_m;
-    let [now_m, _] = found.identified.off_line_m;
+    let now_m = found.identified.points.off_line_m(written);
     if written_m > 0.0 && now_m > CHANGED * written_m {
         warn(format_args!(
             "the arm has changed: by the scenario's values the tip is {:.2} mm off the line, where {:.2} mm were left when \
