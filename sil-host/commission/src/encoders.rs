@@ -45,6 +45,19 @@ pub struct EncodersFound {
     pub deviations: Vec<Deviation>,
 }
 
+impl EncodersFound {
+    /// Returns whether directions and zeros of the encoders are those of the scenario.
+    pub(crate) fn are_as_described(&self) -> bool {
+        let is_of_encoder = |it: &Deviation| {
+            matches!(
+                it,
+                Deviation::EncoderDirection { .. } | Deviation::EncoderZero { .. }
+            )
+        };
+        !self.deviations.iter().any(is_of_encoder)
+    }
+}
+
 /// Measures directions, zeros and tare.
 pub(crate) fn measure<R: Rig>(
     session: &mut Session<'_, R>,

@@ -163,6 +163,8 @@ pub struct Expected {
     pub converters: Converters,
     /// Correction of the encoders as in the scenario.
     pub correction: EncoderCorrection,
+    /// Whether slides have shown the arm's geometry.
+    pub is_identified: bool,
     /// Posture of the scenario's start.
     pub posture: Posture,
     /// Largest torque that the procedure may command, N·m.
@@ -188,6 +190,7 @@ impl Expected {
             belt_tilt_rad: f64::from(configuration.arm.belt_tilt_rad),
             converters: configuration.converters,
             correction: configuration.settings.estimator.encoders,
+            is_identified: scenario.knowledge.off_line_m > 0.0,
             posture: Posture::of(&start),
             torque_limit_nm,
             tick_hz: f64::from(configuration.tick_hz),
@@ -272,7 +275,7 @@ pub fn commission<R: Rig>(
     let mut session = Session::new(rig, expected);
     let encoders = encoders::measure(&mut session)?;
     session.set_encoders(encoders.reversed, encoders.offsets, encoders.correction);
-    let rest = rest::measure(&mut session, &encoders.tare)?;
+    let rest = rest::measure(&mut session, &encoders)?;
     let stages = stages::measure(&mut session, &rest)?;
     session.set_stages(stages.reversed);
     let friction = slide::measure(&mut session, &rest, stages.force_reversed)?;

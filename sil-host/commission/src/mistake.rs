@@ -64,7 +64,7 @@ pub enum Deviation {
         axis: usize,
     },
     /// The belt is higher or lower.
-    #[error("belt: it is {:.1} mm {} than the scenario says (arm.height_m)", 1e3 * .error_m.abs(), if *.error_m < 0.0 { "higher" } else { "lower" })]
+    #[error("belt: it is {:.1} mm {} by the encoders than the scenario says (arm.height_m)", 1e3 * .error_m.abs(), if *.error_m < 0.0 { "higher" } else { "lower" })]
     BeltHeight {
         /// Measured distance of the first joint from the belt minus the scenario's, m.
         error_m: f64,

@@ -244,6 +244,24 @@ fn a_belt_that_has_been_moved_leaves_the_correction_and_takes_what_was_known() {
     );
 }
 
+/// A magnet that slips by less than the operator's hands are trusted, and a belt that moves by less than the zeros are.
+#[test]
+fn a_small_change_of_an_identified_arm_takes_what_was_known_with_it() {
+    let scenario = identified();
+    let mut slipped = scenario.clone();
+    slipped.converters.encoder.offset_counts[1] += 91;
+    let mut lowered = scenario.clone();
+    lowered.arm.height_m += 0.003;
+    for actual in [slipped, lowered] {
+        let mut rig = SimulatedRig::new(&actual, None, 1);
+        let expected = Expected::new(&scenario, TORQUE_LIMIT_NM).unwrap();
+        let commissioned = commission(&mut rig, &expected).unwrap();
+        let corrected = commissioned.applied_to(&scenario).unwrap();
+        assert_eq!(corrected.knowledge.off_line_m, 0.0);
+        assert!(corrected.controller.estimator.tip_deviation_m > 0.01);
+    }
+}
+
 #[test]
 fn play_that_the_operator_has_told_is_kept() {
     let told = "controller.estimator.tip_deviation_m=0.05".to_owned();
