@@ -78,7 +78,7 @@ pub(crate) fn measure<R: Rig>(
         let zero = |correction: &EncoderCorrection| {
             zero(scale, joint, reversed[joint], tilt_rad, correction, &held)
         };
-        let measured = zero(&correction);
+        let measured = zero(&correction)?;
         let error_deg = degrees(scale, scale.difference(scale.offset, measured));
         if reversed[joint] != session.expected.converters.mounting.encoder_reversed[joint] {
             deviations.push(Deviation::EncoderDirection { joint });
@@ -92,7 +92,7 @@ pub(crate) fn measure<R: Rig>(
         for values_rad in terms(&mut correction).map(|(_, values_rad)| values_rad) {
             values_rad[joint] = 0.0;
         }
-        offsets[joint] = zero(&correction).0;
+        offsets[joint] = zero(&correction)?.0;
     }
     let tare = tare(session, &held, &mut deviations)?;
     Ok(EncodersFound {
@@ -134,11 +134,15 @@ fn directions(scales: &[EncoderScale; 2], held: &[MeanReadings]) -> Result<[bool
             });
         }
     }
+    // The elbow turns on in its direction.
+    if elbow_turn * elbow_only < 0.0 {
+        return Err(Mistake::HeldOtherwise { joint: 1 });
+    }
     Ok([first_turn < 0.0, elbow_only > 0.0])
 }
 
 /// Returns the reading of an encoder's own zero, to which the correction is added, in the joint's direction: the mean over
-/// the poses.
+/// the poses, which must agree.
 fn zero(
     scale: &EncoderScale,
     joint: usize,
@@ -146,7 +150,7 @@ fn zero(
     belt_tilt_rad: f64,
     correction: &EncoderCorrection,
     held: &[MeanReadings],
-) -> EncoderCounts {
+) -> Result<EncoderCounts, Mistake> {
     let zeros = held.iter().zip(POSES_DEG).map(|(held, [one, two])| {
         // The belt's inward normal is not plumb if the belt is tilted; the elbow's angle does not change.
         let joints_rad = [one.to_radians() - belt_tilt_rad, (two - one).to_radians()];
@@ -160,11 +164,16 @@ fn zero(
     });
     let zeros: Vec<EncoderCounts> = zeros.collect();
     let [first, ..] = zeros[..] else {
-        return scale.offset;
+        return Ok(scale.offset);
     };
     let sum: i32 = zeros.iter().map(|it| scale.difference(first, *it)).sum();
     let mean = sum / zeros.len() as i32;
-    EncoderCounts(first.0.wrapping_add_signed(mean) & (scale.modulus() - 1))
+    let mean = EncoderCounts(first.0.wrapping_add_signed(mean) & (scale.modulus() - 1));
+    let off_deg = |zero: &EncoderCounts| degrees(scale, scale.difference(mean, *zero)).abs();
+    if zeros.iter().any(|zero| off_deg(zero) > TURN_TOLERANCE_DEG) {
+        return Err(Mistake::HeldOtherwise { joint });
+    }
+    Ok(mean)
 }
 
 /// Returns the mean reading of the force cell without a load.

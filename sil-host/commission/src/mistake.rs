@@ -114,6 +114,15 @@ pub enum Mistake {
         /// Angle by which the encoder turned, degrees.
         turned_deg: f64,
     },
+    /// The operator has held the arm otherwise than told.
+    #[error(
+        "encoder of {}: its angles are not those of the three poses; hold both links in the directions that each task names",
+        JOINT_NAMES[*.joint]
+    )]
+    HeldOtherwise {
+        /// Index of the joint.
+        joint: usize,
+    },
     /// The force cell gives no readings, or codes that no force gives.
     #[error(
         "force cell: no readings between the codes converters.mounting.force_lowest_code and force_highest_code; check its supply, its wires and its select line"

@@ -2,10 +2,13 @@
 
 #![allow(clippy::unwrap_used)]
 
-use painleve_commission::simulated::{BuiltInMistake, SimulatedRig, random_arm};
-use painleve_commission::{CommissionError, Commissioned, Expected, commission};
+use painleve_commission::simulated::{BuiltInMistake, SimulatedError, SimulatedRig, random_arm};
+use painleve_commission::{
+    CommissionError, Commissioned, Expected, Mistake, OperatorTask, RawReadings, Rig, commission,
+};
 use painleve_plant::decimal::as_written;
 use painleve_plant::scenario::{Knowledge, Scenario};
+use painleve_shared::counts::TorqueCounts;
 use painleve_shared::{Arm, ArmParameters, Pose};
 
 const TORQUE_LIMIT_NM: f64 = 1.0;
@@ -179,6 +182,58 @@ fn gap_m(commissioned: &Commissioned, scenario: &Scenario) -> f64 {
         .unwrap()
         .tip_m(&Pose::new(&commissioned.rest_rad));
     tip.y + scenario.arm.height_m
+}
+
+/// An operator who holds a link in another direction than told in one pose.
+struct Careless {
+    rig: SimulatedRig,
+    pose: usize,
+    plumb_deg: [f64; 2],
+    poses: usize,
+}
+
+impl Rig for Careless {
+    type Error = SimulatedError;
+
+    fn instruct(&mut self, mut task: OperatorTask) -> Result<(), SimulatedError> {
+        if let OperatorTask::Hold { plumb_deg } = &mut task {
+            if self.poses == self.pose {
+                *plumb_deg = self.plumb_deg;
+            }
+            self.poses += 1;
+        }
+        self.rig.instruct(task)
+    }
+
+    fn exchange(&mut self, torques: [TorqueCounts; 2]) -> Result<RawReadings, SimulatedError> {
+        self.rig.exchange(torques)
+    }
+}
+
+#[test]
+fn a_pose_that_is_held_otherwise_than_told_gives_no_zero() {
+    let scenario = Scenario::default();
+    let expected = Expected::new(&scenario, TORQUE_LIMIT_NM).unwrap();
+    // The elbow in the other direction, link 1 in the other direction, and link 1 off by 40° with its elbow right.
+    for (pose, plumb_deg, joint) in [
+        (0, [0.0, -90.0], 1),
+        (2, [90.0, 180.0], 1),
+        (1, [-90.0, 90.0], 0),
+        (2, [50.0, -40.0], 0),
+    ] {
+        let mut rig = Careless {
+            rig: SimulatedRig::new(&scenario, None, 1),
+            pose,
+            plumb_deg,
+            poses: 0,
+        };
+        match commission(&mut rig, &expected) {
+            Err(CommissionError::Refused(mistake)) => {
+                assert_eq!(mistake, Mistake::HeldOtherwise { joint }, "{plumb_deg:?}");
+            }
+            other => panic!("{plumb_deg:?}: {other:?}"),
+        }
+    }
 }
 
 #[test]
