@@ -207,8 +207,8 @@ pub fn limits(scenario: &Scenario) -> Limits {
     }
 }
 
-/// Returns the readings of ticks, by the scenario's zeros and scales. Ticks without all readings are left out. Encoders on the
-/// motors lead their joints by the twist of the gears under the torque of the tick before.
+/// Returns the readings of ticks, by the scenario's zeros and scales. Ticks without all readings, or with torques that no stage
+/// gives, are left out. Encoders on the motors lead their joints by the twist of the gears under the torque of the tick before.
 pub fn readings(scenario: &Scenario, ticks: impl IntoIterator<Item = SlideTick>) -> Vec<Reading> {
     let scales = scenario.converters.scales();
     let [scale_1, scale_2] = scales.encoders;
@@ -227,11 +227,15 @@ pub fn readings(scenario: &Scenario, ticks: impl IntoIterator<Item = SlideTick>)
     let mut before_nm = None;
     ticks
         .into_iter()
-        .map(|SlideTick { sensor, torques }| {
+        .filter_map(|SlideTick { sensor, torques }| {
+            if !torques.iter().all(|it| scales.torque.contains(it.0)) {
+                before_nm = None;
+                return None;
+            }
             let torque_nm = torques.map(|torque| f64::from(torque.0) * newton_metres);
             let twisting_nm = before_nm.replace(torque_nm).unwrap_or(torque_nm);
             let twist_rad = |joint: usize| f64::from(soft_rad_nm[joint]) * twisting_nm[joint];
-            let reading = Reading {
+            is_whole(&sensor).then(|| Reading {
                 tick: sensor.tick,
                 encoders_rad: [
                     rad(scale_1, sensor.joints[0]) - twist_rad(0),
@@ -240,11 +244,8 @@ pub fn readings(scenario: &Scenario, ticks: impl IntoIterator<Item = SlideTick>)
                 force_n: [sensor.tangential_force, sensor.normal_force]
                     .map(|force| f64::from(force.0) * newtons),
                 torque_nm,
-            };
-            (sensor, reading)
+            })
         })
-        .filter(|(sensor, _)| is_whole(sensor))
-        .map(|(_, reading)| reading)
         .collect()
 }
 

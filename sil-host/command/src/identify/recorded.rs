@@ -117,7 +117,7 @@ fn of_table(table: impl Read) -> Result<Vec<SlideTick>, String> {
                 .map_err(|_| format!("{name} = {text:?} is not a whole number"))?;
         }
         let [joint_1, joint_2, tangential, normal, torque_1, torque_2] = counts;
-        // Whatever does not fit is out of every encoder's range, too.
+        // Whatever does not fit is out of every converter's range, too.
         let joint = |counts| EncoderCounts(u32::try_from(counts).unwrap_or(u32::MAX));
         let force = |counts| ForceCounts(i32::try_from(counts).unwrap_or(i32::MAX));
         let torque = |counts| TorqueCounts(i32::try_from(counts).unwrap_or(i32::MAX));

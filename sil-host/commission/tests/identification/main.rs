@@ -19,7 +19,7 @@ use painleve_commission::simulated::{
 use painleve_firmware::law::LawSettings;
 use painleve_identify::parameters::Drawn;
 use painleve_identify::torques::{Estimate, Joints};
-use painleve_identify::{Parameter, Refusal};
+use painleve_identify::{Parameter, Reading, Refusal};
 use painleve_plant::Plant;
 use painleve_plant::mechanics::BuiltInPlant;
 use painleve_plant::mechanics::motion::theta;
@@ -252,7 +252,17 @@ fn encoders_on_motors_are_read_without_the_twist_of_the_gears() {
             assert!((twist_rad - expected).abs() < 1e-9, "{index}: {twist_rad}");
         }
     }
-    assert_eq!(soft.iter().map(|it| it.tick).collect::<Vec<_>>(), [7, 8, 9]);
+    let numbers = |readings: &[Reading]| readings.iter().map(|it| it.tick).collect::<Vec<_>>();
+    assert_eq!(numbers(&soft), [7, 8, 9]);
+    // A torque beyond the stages' range is no torque, and twists no gear.
+    let wrong = [
+        tick(7, [100, -300]),
+        tick(8, [i32::MAX, 0]),
+        tick(9, [0, 0]),
+    ];
+    let soft = readings(&scenario, wrong);
+    assert_eq!(numbers(&soft), [7, 9]);
+    assert_eq!(soft[1].encoders_rad, rigid[2].encoders_rad);
 }
 
 /// Joints that turn to and fro show less friction than they have.
