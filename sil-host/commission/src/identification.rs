@@ -131,7 +131,7 @@ pub enum IdentificationError<E: std::error::Error> {
     /// The scenario cannot slide.
     #[error("{0}")]
     Scenario(#[from] ScenarioError),
-    /// A value is out of range.
+    /// The scenario's start is out of range.
     #[error("{0}")]
     Range(#[from] OutOfRange),
 }
@@ -405,7 +405,7 @@ impl Found {
         prior: Prior,
         slides: &[Slide],
         scenario: &Scenario,
-    ) -> Result<Self, OutOfRange> {
+    ) -> Result<Self, Refusal> {
         let geometry = &identified.fit.parameters;
         let known = ArmParameters {
             link_length_m: geometry.link_length_m(),
@@ -425,8 +425,8 @@ impl Found {
     /// Returns the scenario with the values and deviations. `source` says where they come from.
     ///
     /// # Errors
-    /// [`OutOfRange`] for a value that the controller does not take.
-    pub fn applied_to(&self, scenario: &Scenario, source: &str) -> Result<Scenario, OutOfRange> {
+    /// [`Refusal::OutOfRange`] for a value that the controller does not take.
+    pub fn applied_to(&self, scenario: &Scenario, source: &str) -> Result<Scenario, Refusal> {
         let fit = &self.identified.fit;
         let parameters = &fit.parameters;
         let mut corrected = scenario.clone();

@@ -1,6 +1,6 @@
 //! Reasons to refuse a result, each in one sentence, and the motion that is missing.
 
-use painleve_shared::Posture;
+use painleve_shared::{OutOfRange, Posture};
 
 use crate::geometry::Range;
 use crate::parameters::{JOINT_NAMES, Parameter};
@@ -150,4 +150,7 @@ pub enum Refusal {
         /// What would determine it.
         missing: Missing,
     },
+    /// A value by the slides is out of range.
+    #[error("by the slides, {0}")]
+    OutOfRange(#[from] OutOfRange),
 }

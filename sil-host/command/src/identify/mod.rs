@@ -116,13 +116,14 @@ pub fn run(arguments: &IdentifyArguments) -> Result<(), CommandError> {
         scenario.arm_model = Some(arm);
         drawn.length = MEASURED_M / length_m;
     }
+    let warn_of_earlier = |_: &CommandError| warn_of_earlier(&[&arguments.output, &arguments.html]);
     let found = found(arguments, &slides, &scenario, &drawn);
-    let (found, source) =
-        found.inspect_err(|_| warn_of_earlier(&[&arguments.output, &arguments.html]))?;
+    let (found, source) = found.inspect_err(warn_of_earlier)?;
     warn_of_change(&scenario, &written, &found);
-    let identified = found
-        .applied_to(&scenario, &source)
-        .map_err(|error| range(&arguments.scenario, error))?;
+    let identified = found.applied_to(&scenario, &source);
+    let identified = identified
+        .map_err(CommandError::Geometry)
+        .inspect_err(warn_of_earlier)?;
     let text = identified.to_commented_toml();
     let place = advice(&identified).map_err(|error| range(&arguments.scenario, error))?;
     let page = report::html(&identified.name, &found, &place);

@@ -152,6 +152,18 @@ fn arms_as_bad_as_life_are_identified() {
     }
 }
 
+#[test]
+fn a_value_that_no_controller_takes_is_that_of_the_slides() {
+    let scenario = Scenario::default();
+    let (found, _) = identified(&scenario, 51_000, None);
+    let mut found = found.unwrap();
+    let zero = Parameter::Zero(1);
+    found.identified.fit.parameters.set(zero, 0.25);
+    let refusal = found.applied_to(&scenario, "").unwrap_err().to_string();
+    let expected = "by the slides, controller.estimator.encoders.zero_rad.1 = 0.25 is outside";
+    assert!(refusal.starts_with(expected), "{refusal}");
+}
+
 /// Zeros that are wrong by almost 3° lift a tip that presses with 4 N only.
 #[test]
 fn a_tip_that_is_lifted_presses_more_at_the_next_attempt() {
