@@ -433,13 +433,28 @@ impl Found {
         let mut arm = scenario.controller_configuration().arm;
         arm.link_length_m = parameters.link_length_m().map(|it| rounded(it) as f32);
         arm.height_m = rounded(parameters.get(Parameter::Height)) as f32;
-        let joints = &self.joints.joints;
-        for (joint, found) in joints.iter().enumerate() {
-            for (value, estimate) in [
-                (&mut arm.coulomb_friction_nm[joint], found.friction_nm),
-                (&mut arm.stiffness_nm_rad[joint], found.stiffness_nm_rad),
+        let Knowledge {
+            mut coulomb_friction_nm,
+            mut stiffness_nm_rad,
+            ..
+        } = scenario.knowledge;
+        for (joint, found) in self.joints.joints.iter().enumerate() {
+            for (value, deviation, estimate) in [
+                (
+                    &mut arm.coulomb_friction_nm[joint],
+                    &mut coulomb_friction_nm[joint],
+                    found.friction_nm,
+                ),
+                (
+                    &mut arm.stiffness_nm_rad[joint],
+                    &mut stiffness_nm_rad[joint],
+                    found.stiffness_nm_rad,
+                ),
             ] {
-                *value = better(*value, estimate);
+                if is_better(estimate, *value) {
+                    *value = rounded(estimate.value).max(0.0) as f32;
+                    *deviation = rounded(estimate.deviation);
+                }
             }
         }
         corrected.arm_model = Some(arm);
@@ -472,8 +487,8 @@ impl Found {
             told_m: rounded(told_m(scenario)),
             off_line_m: rounded(self.identified.off_line_m[1]),
             ripple_m_s2: rounded(ripple_m_s2),
-            coulomb_friction_nm: joints.map(|it| rounded(it.friction_nm.deviation)),
-            stiffness_nm_rad: joints.map(|it| rounded(it.stiffness_nm_rad.deviation)),
+            coulomb_friction_nm,
+            stiffness_nm_rad,
         };
         painleve_shared::settings::Settings::validate(&corrected)?;
         Ok(corrected)
@@ -520,14 +535,9 @@ fn ripple_m_s2(
     libm::sqrt(sum / f64::from(count.max(1)))
 }
 
-/// Returns the value found, unless it is known so badly that the one before is as good.
-fn better(before: f32, found: Estimate) -> f32 {
-    let larger = found.value.max(f64::from(before));
-    if found.deviation > BETTER * larger {
-        before
-    } else {
-        rounded(found.value).max(0.0) as f32
-    }
+/// Returns whether a value found is better than the one before; it may be known so badly that it is not.
+fn is_better(found: Estimate, before: f32) -> bool {
+    found.deviation <= BETTER * found.value.max(f64::from(before))
 }
 
 #[cfg(test)]
@@ -538,10 +548,10 @@ mod tests {
     fn a_value_that_is_known_badly_does_not_replace_another() {
         let found = |value, deviation| Estimate { value, deviation };
         // No friction to speak of, where there was said to be some; then the other way round, and nothing known.
-        assert_eq!(better(0.05, found(0.001, 0.002)), 0.001);
-        assert_eq!(better(0.0, found(0.06, 0.004)), 0.06);
-        assert_eq!(better(0.05, found(0.3, 0.4)), 0.05);
-        assert_eq!(better(0.0, found(-0.01, 0.02)), 0.0);
+        assert!(is_better(found(0.001, 0.002), 0.05));
+        assert!(is_better(found(0.06, 0.004), 0.0));
+        assert!(!is_better(found(0.3, 0.4), 0.05));
+        assert!(!is_better(found(-0.01, 0.02), 0.0));
     }
 
     #[test]

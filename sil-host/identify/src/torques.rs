@@ -20,6 +20,7 @@ use painleve_shared::{
 use crate::fit::sharing;
 use crate::geometry::joint_rad;
 use crate::parameters::Parameters;
+use crate::verdict::BELIEVED;
 use crate::{Limits, Reading, Slide};
 
 /// Time over which readings are averaged, s.
@@ -84,6 +85,18 @@ pub struct Joint {
     pub stiffness_nm_rad: Estimate,
     /// Torque of the stage relative to the commanded one.
     pub gain: Estimate,
+}
+
+impl Joint {
+    /// Returns whether its friction would drive it.
+    pub fn drives_itself(&self) -> bool {
+        self.friction_nm.value < -BELIEVED * self.friction_nm.deviation
+    }
+
+    /// Returns whether its stage gives another torque than any healthy one.
+    pub fn has_another_gain(&self) -> bool {
+        (self.gain.value - 1.0).abs() > BELIEVED * GAIN
+    }
 }
 
 /// What the slides show of both joints.
@@ -429,6 +442,20 @@ mod tests {
             kept(|tick| tick / 100 != 1),
             [0, 2, 3, 4].map(|it| (it, 100))
         );
+    }
+
+    #[test]
+    fn only_what_no_healthy_joint_has_is_impossible() {
+        let of = |value: f64, deviation: f64| Estimate { value, deviation };
+        let joint = |friction_nm, gain| Joint {
+            friction_nm,
+            gain,
+            ..Joint::default()
+        };
+        let healthy = joint(of(-0.005, 0.002), of(1.35, 0.05));
+        assert!(!healthy.drives_itself() && !healthy.has_another_gain());
+        let impossible = joint(of(-0.009, 0.002), of(0.55, 0.05));
+        assert!(impossible.drives_itself() && impossible.has_another_gain());
     }
 
     #[test]

@@ -25,7 +25,7 @@ const OWN: f64 = 1e-3;
 const SLIP_COUNTS: f64 = 4.0;
 
 /// Largest deviation from what is known beforehand, standard deviations.
-const BELIEVED: f64 = 4.0;
+pub(crate) const BELIEVED: f64 = 4.0;
 
 /// Least distance of the stretch to slide along from that slid along, as a part of the reach, to be told.
 const FARTHER: f64 = 0.02;

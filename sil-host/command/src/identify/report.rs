@@ -5,6 +5,7 @@ use core::fmt::Write;
 use painleve_chart::markup::{document, escaped};
 use painleve_commission::identification::Found;
 use painleve_identify::Parameter;
+use painleve_identify::parameters::JOINT_NAMES;
 use painleve_identify::torques::{Estimate, Joint};
 use painleve_process::terminal;
 use serde_json::{Value, json};
@@ -87,13 +88,13 @@ pub fn json(found: &Found) -> Value {
     })
 }
 
-fn sentences(found: &Found) -> [String; 3] {
+fn sentences(found: &Found) -> Vec<String> {
     let identified = &found.identified;
     let [off_before_m, off_after_m] = identified.off_line_m;
     let [left_before_nm, left_after_nm] = found.joints.left_over_nm;
     let length = identified.fit.parameters.get(Parameter::Length);
     let length_deviation = identified.fit.deviation(Parameter::Length) / length;
-    [
+    let mut sentences = vec![
         format!(
             "The tip stays on a line to {:.3} mm (by the values before: {:.2} mm), in {} readings.",
             1e3 * off_after_m,
@@ -113,7 +114,21 @@ fn sentences(found: &Found) -> [String; 3] {
             1e3 * left_after_nm,
             1e3 * left_before_nm
         ),
-    ]
+    ];
+    for (joint, name) in found.joints.joints.iter().zip(JOINT_NAMES) {
+        if joint.drives_itself() {
+            sentences.push(format!(
+                "The friction of {name} comes out below zero, which no joint has: check the arm's masses and springs, and the force cell."
+            ));
+        }
+        if joint.has_another_gain() {
+            sentences.push(format!(
+                "The torque stage of {name} seems to give {:.2} times the commanded torque: check converters.stages.",
+                joint.gain.value
+            ));
+        }
+    }
+    sentences
 }
 
 /// Returns the geometry, with angles in milliradians and lengths in millimetres.

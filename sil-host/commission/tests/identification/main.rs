@@ -153,10 +153,24 @@ fn arms_as_bad_as_life_are_identified() {
 }
 
 #[test]
-fn a_value_that_no_controller_takes_is_that_of_the_slides() {
+fn a_value_that_is_not_taken_or_that_no_controller_takes_leaves_what_was_known() {
     let scenario = Scenario::default();
     let (found, _) = identified(&scenario, 51_000, None);
     let mut found = found.unwrap();
+    let known = found.applied_to(&scenario, "").unwrap();
+    found.joints.joints[0].friction_nm = Estimate {
+        value: 0.2,
+        deviation: 0.3,
+    };
+    let again = found.applied_to(&known, "").unwrap();
+    assert_eq!(again.arm_model, known.arm_model);
+    assert_eq!(again.knowledge, known.knowledge);
+    let [one_nm, two_nm] = found
+        .applied_to(&scenario, "")
+        .unwrap()
+        .knowledge
+        .coulomb_friction_nm;
+    assert!(one_nm == 0.0 && two_nm > 0.0, "{one_nm} {two_nm}");
     let zero = Parameter::Zero(1);
     found.identified.fit.parameters.set(zero, 0.25);
     let refusal = found.applied_to(&scenario, "").unwrap_err().to_string();
