@@ -170,15 +170,12 @@ impl Fit {
         libm::sqrt(self.covariance[(index, index)])
     }
 
-    /// Returns the standard deviation of the tip's distance from either edge, m: the largest in these postures. The
-    /// edges move with the reach. A wrong scale moves both, and does not matter.
-    pub fn tip_deviation_m(
-        &self,
-        postures: impl Iterator<Item = Posture>,
-        covariance: &Square,
-    ) -> f64 {
+    /// Returns the standard deviation of the tip's distance from either edge, m: the largest in both postures, since the governor
+    /// has one for both. The edges move with the reach. A wrong scale moves both, and does not matter.
+    pub fn tip_deviation_m(&self) -> f64 {
         let (reach, reach_by) = reach_m(&self.parameters);
-        self.largest(postures, covariance, EDGE, |place| {
+        let postures = [Posture::ElbowDown, Posture::ElbowUp].into_iter();
+        self.largest(postures, &self.covariance, EDGE, |place| {
             reach_by * (place.tip_t_m / reach) - place.tip_by
         })
     }
@@ -236,9 +233,7 @@ impl Fit {
 impl Prior {
     /// Returns the standard deviation of the tip's distance from either edge, m, before any slide.
     pub fn tip_deviation_m(&self) -> f64 {
-        let fit = Fit::of_prior(self);
-        let postures = [Posture::ElbowDown, Posture::ElbowUp];
-        fit.tip_deviation_m(postures.into_iter(), &fit.covariance)
+        Fit::of_prior(self).tip_deviation_m()
     }
 }
 

@@ -112,11 +112,10 @@ impl Default for Limits {
 pub struct Identified {
     /// The parameters with their covariance.
     pub fit: Fit,
-    /// Standard deviation of the tip's position relative to the edges, m: the largest in the postures that have been
-    /// slid in.
+    /// Standard deviation of the tip's position relative to the edges, m: the largest in both postures.
     pub tip_deviation_m: f64,
-    /// Standard deviation of the tip's position along the belt, m, if link 1 has its length: the largest in these
-    /// postures within [`FAR`](fit::FAR).
+    /// Standard deviation of the tip's position along the belt, m, if link 1 has its length: the largest in the postures that
+    /// have been slid in, within [`FAR`](fit::FAR).
     pub place_deviation_m: f64,
     /// Distance of the tip from the line, root mean square, m: with the parameters known before, and with these.
     pub off_line_m: [f64; 2],
@@ -142,10 +141,10 @@ pub fn identify(slides: &[Slide], prior: &Prior, limits: &Limits) -> Result<Iden
     verdict::check_prior(&fit, prior)?;
     let ranges = points.ranges(&fit.parameters);
     verdict::check_observed(&points, &ranges, &fit, prior, limits)?;
-    let postures = || ranges.iter().map(|range| range.posture);
+    let postures = ranges.iter().map(|range| range.posture);
     Ok(Identified {
-        tip_deviation_m: fit.tip_deviation_m(postures(), &fit.covariance),
-        place_deviation_m: fit.place_deviation_m(postures(), &fit.covariance),
+        tip_deviation_m: fit.tip_deviation_m(),
+        place_deviation_m: fit.place_deviation_m(postures, &fit.covariance),
         off_line_m: [before, after],
         readings: points.readings,
         points,

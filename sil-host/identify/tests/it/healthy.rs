@@ -118,6 +118,20 @@ fn a_short_slide_or_one_posture_is_refused_with_the_motion_that_is_missing() {
     assert!(!missing.is_new, "{missing}");
 }
 
+/// The governor keeps one distance in both postures.
+#[test]
+fn the_distance_from_the_edges_counts_the_posture_without_a_slide() {
+    let mut rig = Rig::new(FIRST_SEED);
+    let slides = rig.slides();
+    let first_look = limits().of_first_look();
+    let of = |slides: &[_]| identify(slides, &rig.prior, &first_look).unwrap();
+    let both = of(&slides).tip_deviation_m;
+    let one = slides.iter().map(|slide| of(std::slice::from_ref(slide)));
+    for identified in one {
+        assert!(identified.tip_deviation_m > 3.0 * both, "{both}");
+    }
+}
+
 /// An arm that vibrates leaves more over than a healthy one, and knows its tip less well: that is no other line.
 #[test]
 fn too_much_noise_is_not_told_as_a_line_that_is_not_straight() {
