@@ -36,6 +36,17 @@ impl core::fmt::Display for Missing {
     }
 }
 
+fn advice(missing: Option<&Missing>, off_mm: f64) -> String {
+    missing.map_or_else(
+        || {
+            format!(
+                "they go far enough, but shake too much, {off_mm:.2} mm off a line, root mean square; check the belt's waves and vibration, its seam, and play in the joints"
+            )
+        },
+        Missing::to_string,
+    )
+}
+
 fn name(posture: Posture) -> &'static str {
     match posture {
         Posture::ElbowUp => "elbow up",
@@ -140,15 +151,18 @@ pub enum Refusal {
     },
     /// The slides do not determine the tip's position.
     #[error(
-        "the slides determine the tip's position to {deviation_mm:.2} mm only, where {limit_mm:.2} mm are needed: {missing}"
+        "the slides determine the tip's position to {deviation_mm:.2} mm only, where {limit_mm:.2} mm are needed: {}",
+        advice(.missing.as_ref(), *.off_mm)
     )]
     NotObserved {
         /// Standard deviation, mm.
         deviation_mm: f64,
         /// Largest one, mm.
         limit_mm: f64,
-        /// What would determine it.
-        missing: Missing,
+        /// Distance of the tip from a straight line, root mean square, mm.
+        off_mm: f64,
+        /// The slide that would determine it; `None` if there has been each that could.
+        missing: Option<Missing>,
     },
     /// A value by the slides is out of range.
     #[error("by the slides, {0}")]

@@ -199,20 +199,10 @@ pub(crate) fn check_observed(
             least = Some((then_m, missing));
         }
     }
-    let missing = least.map_or(
-        Missing {
-            range: Range {
-                posture: ranges.first().map_or(Posture::ElbowDown, |it| it.posture),
-                from_m: -FAR * reach,
-                to_m: FAR * reach,
-            },
-            is_new: false,
-        },
-        |(_, missing)| missing,
-    );
     Err(Refusal::NotObserved {
         deviation_mm: 1e3 * now_m,
         limit_mm: 1e3 * limits.tip_deviation_m,
-        missing,
+        off_mm: 1e3 * points.off_line_m(&fit.parameters),
+        missing: least.map(|(_, missing)| missing),
     })
 }

@@ -1,7 +1,7 @@
 //! Healthy arms are identified, and their errors are as large as told.
 
 use painleve_identify::geometry::reach_m;
-use painleve_identify::{Parameter, Refusal, identify};
+use painleve_identify::{Limits, Parameter, Refusal, identify};
 use painleve_shared::Posture;
 
 use crate::arms::{Rig, limits};
@@ -101,7 +101,7 @@ fn waves_of_the_belt_do_not_pass_for_errors_of_encoders() {
 fn a_short_slide_or_one_posture_is_refused_with_the_motion_that_is_missing() {
     let mut rig = Rig::new(FIRST_SEED);
     let refused = |slides: &[_], rig: &Rig| match identify(slides, &rig.prior, &limits()) {
-        Err(Refusal::NotObserved { missing, .. }) => missing,
+        Err(Refusal::NotObserved { missing, .. }) => missing.unwrap(),
         other => panic!("{other:?}"),
     };
     let one = [rig.slide(Posture::ElbowDown, -0.8, 0.75)];
@@ -116,6 +116,21 @@ fn a_short_slide_or_one_posture_is_refused_with_the_motion_that_is_missing() {
     ];
     let missing = refused(&short, &rig);
     assert!(!missing.is_new, "{missing}");
+}
+
+#[test]
+fn slides_that_go_far_enough_are_told_that_they_shake() {
+    let mut rig = Rig::new(FIRST_SEED);
+    let exact = Limits {
+        tip_deviation_m: 1e-5,
+        ..limits()
+    };
+    let refusal = identify(&rig.slides(), &rig.prior, &exact).unwrap_err();
+    let message = refusal.to_string();
+    assert!(
+        message.contains("they go far enough, but shake too much"),
+        "{message}"
+    );
 }
 
 /// The governor keeps one distance in both postures.
