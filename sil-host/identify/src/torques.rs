@@ -104,8 +104,9 @@ impl Joint {
 pub struct Joints {
     /// Joints 1 and 2.
     pub joints: [Joint; 2],
-    /// Torque that the model leaves over, root mean square, N·m: that of the arm known before, and with this result.
-    pub left_over_nm: [f64; 2],
+    /// Torque that the model leaves over, root mean square, N·m: that of the arm known before, and with this result. `None` if
+    /// no joint has turned enough.
+    pub left_over_nm: Option<[f64; 2]>,
 }
 
 /// Means of readings over a short time.
@@ -197,13 +198,17 @@ impl Joints {
                 gain: assured(gain, commanded.deviation * gain * gain),
             }
         };
+        let mut before = Values::zeros();
+        for (joint, friction_nm) in known.coulomb_friction_nm.into_iter().enumerate() {
+            before[OF_JOINT * joint + FRICTION] = friction_nm;
+        }
         let rms = |unknowns: &Values| {
             let squares = equations.iter().map(|it| it.off_nm(unknowns).powi(2));
-            libm::sqrt(squares.sum::<f64>() / equations.len().max(1) as f64)
+            libm::sqrt(squares.sum::<f64>() / equations.len() as f64)
         };
         Self {
             joints: [joint(0), joint(1)],
-            left_over_nm: [rms(&Values::zeros()), rms(&solution.unknowns)],
+            left_over_nm: (!equations.is_empty()).then(|| [rms(&before), rms(&solution.unknowns)]),
         }
     }
 }
@@ -442,6 +447,27 @@ mod tests {
             kept(|tick| tick / 100 != 1),
             [0, 2, 3, 4].map(|it| (it, 100))
         );
+    }
+
+    #[test]
+    fn torques_are_left_over_beyond_the_friction_known_before() {
+        let known = ArmParameters::<f64> {
+            coulomb_friction_nm: [0.05, 0.0],
+            ..ArmParameters::default()
+        };
+        let deviations = Values::repeat(1.0);
+        let left_over_nm =
+            |equations: &[Equation]| Joints::fitted(equations, &deviations, &known).left_over_nm;
+        assert_eq!(left_over_nm(&[]), None);
+        let mut by = Values::zeros();
+        by[FRICTION] = -1.0;
+        let [before_nm, _] = left_over_nm(&[Equation {
+            joint: 0,
+            by,
+            left_over_nm: -0.06,
+        }])
+        .unwrap();
+        assert!((before_nm - 0.01).abs() < 1e-9, "{before_nm}");
     }
 
     #[test]

@@ -91,7 +91,14 @@ pub fn json(found: &Found) -> Value {
 fn sentences(found: &Found) -> Vec<String> {
     let identified = &found.identified;
     let [off_before_m, off_after_m] = identified.off_line_m;
-    let [left_before_nm, left_after_nm] = found.joints.left_over_nm;
+    let of_torques = match found.joints.left_over_nm {
+        Some([before_nm, after_nm]) => format!(
+            "The arm's model explains the torques to {:.0} mN·m (by the values before: {:.0} mN·m).",
+            1e3 * after_nm,
+            1e3 * before_nm
+        ),
+        None => "The torques show nothing: no joint has turned far enough in one direction.".into(),
+    };
     let length = identified.fit.parameters.get(Parameter::Length);
     let length_deviation = identified.fit.deviation(Parameter::Length) / length;
     let mut sentences = vec![
@@ -109,11 +116,7 @@ fn sentences(found: &Found) -> Vec<String> {
             1e3 * identified.tip_deviation_m,
             1e3 * found.prior.tip_deviation_m()
         ),
-        format!(
-            "The arm's model explains the torques to {:.0} mN·m (by the values before: {:.0} mN·m).",
-            1e3 * left_after_nm,
-            1e3 * left_before_nm
-        ),
+        of_torques,
     ];
     for (joint, name) in found.joints.joints.iter().zip(JOINT_NAMES) {
         if joint.drives_itself() {

@@ -147,7 +147,7 @@ fn arms_as_bad_as_life_are_identified() {
         for (name, truth, found) in assert_joints_found(&actual, &joints) {
             assert!(found.deviation < 0.1 * truth, "{name}: {truth}, {found:?}");
         }
-        let [before_nm, after_nm] = joints.left_over_nm;
+        let [before_nm, after_nm] = joints.left_over_nm.unwrap();
         assert!(after_nm < 0.2 * before_nm, "{before_nm} {after_nm}");
     }
 }
