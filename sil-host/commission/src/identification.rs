@@ -249,6 +249,23 @@ pub fn readings(scenario: &Scenario, ticks: impl IntoIterator<Item = SlideTick>)
         .collect()
 }
 
+/// Returns the slide of ticks in a posture, of the ticks that a `whole` one has.
+pub fn slide_of(
+    scenario: &Scenario,
+    posture: Posture,
+    ticks: Vec<SlideTick>,
+    whole: usize,
+) -> Slide {
+    let count = ticks.len();
+    let readings = readings(scenario, ticks);
+    Slide {
+        posture,
+        missing: count - readings.len(),
+        whole,
+        readings,
+    }
+}
+
 /// Returns the scenario of a slide in a posture, under a normal force (N), to both ends, a part of the reach from the
 /// middle. The belt runs in the direction in which p is larger.
 ///
@@ -333,15 +350,13 @@ pub fn identify_arm<R: SlideRig>(
                 let program = slide_scenario(known, share, posture, force_n)?;
                 let slid = rig.slide(&program, posture);
                 let slid = slid.map_err(IdentificationError::Rig)?;
-                Ok::<_, IdentificationError<R::Error>>(Slide {
-                    posture,
-                    whole: if slid.is_complete {
-                        slid.ticks.len()
-                    } else {
-                        program.run.ticks() as usize
-                    },
-                    readings: readings(scenario, slid.ticks),
-                })
+                let whole = if slid.is_complete {
+                    slid.ticks.len()
+                } else {
+                    program.run.ticks() as usize
+                };
+                let slide = slide_of(scenario, posture, slid.ticks, whole);
+                Ok::<_, IdentificationError<R::Error>>(slide)
             };
             let [first_n, others_n @ ..] = ATTEMPTS_N;
             let mut slide = attempt(first_n)?;
@@ -569,6 +584,7 @@ mod tests {
             let slide = Slide {
                 posture: Posture::ElbowUp,
                 readings: readings.collect(),
+                missing: 0,
                 whole: 3000,
             };
             super::ripple_m_s2(&[slide], &geometry, &arm, 1000.0, &limits(&scenario))

@@ -54,7 +54,9 @@ pub struct Slide {
     pub posture: Posture,
     /// Readings in order of time.
     pub readings: Vec<Reading>,
-    /// Number of readings that a whole slide has: more than there are if it ended early.
+    /// Number of ticks without all readings.
+    pub missing: usize,
+    /// Number of ticks that a whole slide has: more than there are if it ended early.
     pub whole: usize,
 }
 
@@ -65,10 +67,10 @@ impl Slide {
         readings.filter(|it| it.force_n[1] >= limits.contact_n)
     }
 
-    /// Returns the share of a whole slide's readings with the tip on the belt.
+    /// Returns the share of a whole slide's readings with the tip on the belt. What is missing is no reading.
     pub fn share_on_belt(&self, limits: &Limits) -> f64 {
-        let whole = self.whole.max(self.readings.len()).max(1);
-        self.on_belt(limits).count() as f64 / whole as f64
+        let whole = self.whole.saturating_sub(self.missing);
+        self.on_belt(limits).count() as f64 / whole.max(self.readings.len()).max(1) as f64
     }
 }
 

@@ -22,6 +22,9 @@ const UNEVEN_M: f64 = 20e-6;
 /// Least share of readings with the tip on the belt.
 pub const ON_BELT: f64 = 0.8;
 
+/// Largest share of ticks without all readings.
+const MOST_MISSING: f64 = 0.2;
+
 /// Least number of stretches of all slides.
 const LEAST_POINTS: usize = 60;
 
@@ -139,6 +142,16 @@ impl Points {
         if let Some(reading) = of.readings.iter().find(|it| !is_finite(it)) {
             let tick = reading.tick;
             return Err(Refusal::NotFinite { slide, tick });
+        }
+        if of.readings.is_empty() && of.missing == 0 {
+            return Err(Refusal::NeverTracked { slide });
+        }
+        let missing = of.missing as f64 / (of.missing + of.readings.len()) as f64;
+        if missing > MOST_MISSING {
+            return Err(Refusal::MissingReadings {
+                slide,
+                percent: 100.0 * missing,
+            });
         }
         let share = of.share_on_belt(limits);
         if share < ON_BELT {

@@ -65,6 +65,26 @@ pub enum Refusal {
         /// Control tick of the reading.
         tick: u32,
     },
+    /// There is no tick.
+    #[error(
+        "slide {}: the drive has tracked in no tick; give the record of a slide, or see what kept the drive from it",
+        .slide + 1
+    )]
+    NeverTracked {
+        /// Index of the slide.
+        slide: usize,
+    },
+    /// Too many ticks have no reading of some sensor, or none that the scenario's sensors give.
+    #[error(
+        "slide {}: {percent:.0} % of the ticks lack a reading or torque that the scenario's converters can give; check the sensors' lines, and bits in converters.encoder, converters.force and converters.torque",
+        .slide + 1
+    )]
+    MissingReadings {
+        /// Index of the slide.
+        slide: usize,
+        /// Share of ticks, %.
+        percent: f64,
+    },
     /// The tip was in the air.
     #[error(
         "slide {}: the tip was on the belt in {percent:.0} % of the readings only (f_n of {contact_n} N or more); press it down, and check the force cell",

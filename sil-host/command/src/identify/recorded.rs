@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use std::str::FromStr;
 
 use clap::ValueEnum;
-use painleve_commission::identification::{SlideTick, readings};
+use painleve_commission::identification::{SlideTick, slide_of};
 use painleve_files::input_file;
 use painleve_identify::Slide;
 use painleve_plant::scenario::Scenario;
@@ -65,11 +65,8 @@ impl Recorded {
             path: self.path.clone(),
             reason,
         })?;
-        Ok(Slide {
-            posture: self.posture.into(),
-            whole: ticks.len(),
-            readings: readings(scenario, ticks),
-        })
+        let whole = ticks.len();
+        Ok(slide_of(scenario, self.posture.into(), ticks, whole))
     }
 
     fn ticks(&self) -> Result<Vec<SlideTick>, String> {

@@ -105,6 +105,7 @@ impl Rig {
         let readings: Vec<Reading> = readings.collect();
         Slide {
             posture,
+            missing: 0,
             whole: readings.len(),
             readings,
         }

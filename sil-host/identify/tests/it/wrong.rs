@@ -145,3 +145,23 @@ fn a_length_that_is_not_as_told_contradicts_the_height() {
     );
     assert!(missed.is_empty(), "{missed:#?}");
 }
+
+#[test]
+fn a_slide_without_ticks_or_readings_does_not_blame_the_force_cell() {
+    let missed = missed(
+        |_, slides| slides[1].readings.clear(),
+        |refusal| *refusal == Refusal::NeverTracked { slide: 1 },
+    );
+    assert!(missed.is_empty(), "{missed:#?}");
+    let missed = self::missed(
+        |_, slides| {
+            let Slide {
+                readings, missing, ..
+            } = &mut slides[0];
+            *missing = readings.len() / 4 + 1;
+            readings.truncate(readings.len() - *missing);
+        },
+        |refusal| matches!(refusal, Refusal::MissingReadings { slide: 0, percent } if *percent > 24.9),
+    );
+    assert!(missed.is_empty(), "{missed:#?}");
+}
