@@ -83,7 +83,7 @@ pub struct Limits {
     pub contact_n: f64,
     /// Largest standard deviation of the tip's position within [`FAR`](fit::FAR), m, apart from that by the measured length.
     pub tip_deviation_m: f64,
-    /// Largest distance of the tip from a line, root mean square, m.
+    /// Largest distance of the tip from a line, root mean square, m, apart from what rounding adds.
     pub off_line_m: f64,
 }
 

@@ -184,9 +184,21 @@ impl Points {
 
     /// Returns the standard deviation of the depth at a point by rounding and unevenness, m.
     pub fn deviation_m(&self, place: &Place) -> f64 {
+        libm::hypot(self.rounding_m(place), UNEVEN_M)
+    }
+
+    /// Returns the standard deviation of the depth at a point by rounding, m.
+    fn rounding_m(&self, place: &Place) -> f64 {
         let [by_1, by_2] = place.depth_by_joint;
-        let rounding_m = self.count_rad / libm::sqrt(12.0) * libm::hypot(by_1, by_2);
-        libm::hypot(rounding_m, UNEVEN_M)
+        self.count_rad / libm::sqrt(12.0) * libm::hypot(by_1, by_2)
+    }
+
+    /// Returns a distance from the line with what rounding adds to it by these parameters, root mean square, m.
+    pub(crate) fn with_rounding_m(&self, off_line_m: f64, parameters: &Parameters) -> f64 {
+        let rounding_m = |point: &Point| self.rounding_m(&point.place(parameters));
+        let squares = self.points.iter().map(|point| rounding_m(point).powi(2));
+        let mean = squares.sum::<f64>() / self.points.len() as f64;
+        libm::hypot(off_line_m, libm::sqrt(mean))
     }
 
     /// Returns how far the tip is from the line by these parameters, root mean square, m.

@@ -41,7 +41,8 @@ pub(crate) fn check_line(
     fit: &Fit,
     off_line_m: f64,
 ) -> Result<(), Refusal> {
-    let is_off = off_line_m > limits.off_line_m;
+    let most_m = points.with_rounding_m(limits.off_line_m, &fit.parameters);
+    let is_off = off_line_m > most_m;
     let other = other_posture(points, fit);
     if is_off || other.is_some() {
         let others: [(Change, Refusal); 3] = [
@@ -59,7 +60,7 @@ pub(crate) fn check_line(
             let changed = points.with(&prior.parameters, change);
             let fit = Fit::new(&changed, prior);
             let left_m = changed.off_line_m(&fit.parameters);
-            let is_whole = left_m <= limits.off_line_m && other_posture(&changed, &fit).is_none();
+            let is_whole = left_m <= most_m && other_posture(&changed, &fit).is_none();
             if left_m < EXPLAINS * off_line_m || is_whole {
                 return Err(refusal);
             }
@@ -78,7 +79,7 @@ pub(crate) fn check_line(
     if is_off {
         return Err(Refusal::NotALine {
             off_mm: 1e3 * off_line_m,
-            most_mm: 1e3 * limits.off_line_m,
+            most_mm: 1e3 * most_m,
         });
     }
     Ok(())

@@ -8,8 +8,8 @@ use painleve_shared::Posture;
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
-/// One count of an encoder, rad.
-pub const COUNT_RAD: f64 = core::f64::consts::TAU / 16384.0;
+/// One count of an encoder of 14 bits, rad.
+const COUNT_RAD: f64 = core::f64::consts::TAU / 16384.0;
 
 /// Speed of a slide at 1 kHz, m per reading.
 const STEP_M: f64 = 1e-4;
@@ -23,6 +23,8 @@ pub struct Rig {
     pub prior: Prior,
     /// Amplitude of waves that pass under the tip as the belt runs, m.
     pub waves_m: f64,
+    /// One count of its encoders, rad.
+    pub count_rad: f64,
     pub generator: Pcg64,
 }
 
@@ -58,6 +60,7 @@ impl Rig {
             actual,
             prior: measured.prior(nominal),
             waves_m: 0.0,
+            count_rad: COUNT_RAD,
             generator,
         }
     }
@@ -85,6 +88,7 @@ impl Rig {
             actual,
             prior,
             waves_m: 0.0,
+            count_rad: COUNT_RAD,
             generator,
         }
     }
@@ -121,7 +125,7 @@ impl Rig {
         let exact = angles(&here, posture, tip_t_m);
         let rounded = exact.map(|angle| {
             let noise = self.generator.random_range(-1e-4..1e-4);
-            ((angle + noise) / COUNT_RAD).round() * COUNT_RAD
+            ((angle + noise) / self.count_rad).round() * self.count_rad
         });
         Reading {
             tick: 0,

@@ -164,6 +164,20 @@ fn too_much_noise_is_not_told_as_a_line_that_is_not_straight() {
 }
 
 #[test]
+fn coarse_encoders_are_not_told_as_a_line_that_is_not_straight() {
+    let mut rig = Rig::new(FIRST_SEED);
+    rig.count_rad *= 8.0;
+    let coarse = Limits {
+        count_rad: rig.count_rad,
+        ..limits()
+    };
+    match identify(&rig.slides(), &rig.prior, &coarse) {
+        Ok(_) | Err(Refusal::NotObserved { .. }) => {}
+        other => panic!("{other:?}"),
+    }
+}
+
+#[test]
 fn a_slide_that_ended_early_has_been_on_the_belt_for_its_part_only() {
     let mut rig = Rig::new(FIRST_SEED);
     let mut slides = rig.slides();
