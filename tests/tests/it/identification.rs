@@ -119,6 +119,11 @@ fn records_of_slides_show_an_arm() {
         let error_nm = friction_nm(&found, joint) - FRICTION_NM;
         assert!(error_nm.abs() < 0.06 * FRICTION_NM, "{joint}: {found}");
     }
+    let rescaled = [&line[..], &["--set", "converters.force.range_n=30"]].concat();
+    let refused = bench.run(&rescaled);
+    assert_eq!(code(refused.status), 2, "{}", errors(&refused));
+    let reason = "elbow-down.mcap: its converters.force.range_n is 20.0, that of the scenario 30.0";
+    assert!(errors(&refused).contains(reason), "{}", errors(&refused));
     // Told the wrong posture, it writes nothing, and says that the files are not of this run.
     let before = std::fs::read(bench.path("out/identified.toml")).unwrap();
     let swapped = ["elbow-up=elbow-down.mcap", "elbow-down=up.csv"];

@@ -15,6 +15,7 @@ use painleve_shared::frame::SensorFrame;
 use painleve_study_core::options::PostureOption;
 
 use super::super::CommandError;
+use super::super::given_scenario;
 use super::super::output_error::InputError;
 
 /// Columns of the table that a slide needs.
@@ -25,6 +26,16 @@ const COLUMNS: [&str; 6] = [
     "sensor.normal_force_counts",
     "actuator.u1_counts",
     "actuator.u2_counts",
+];
+
+/// Keys that say what the counts of these columns mean.
+const SCALES: [&str; 6] = [
+    "converters.encoder.bits",
+    "converters.encoder.offset_counts",
+    "converters.force.bits",
+    "converters.force.range_n",
+    "converters.torque.bits",
+    "converters.torque.range_nm",
 ];
 
 /// Column with the control tick; the rows of a table without it are counted.
@@ -59,19 +70,42 @@ impl Recorded {
     /// Reads the slide.
     ///
     /// # Errors
-    /// [`InputError`] if the file cannot be read or has no such columns.
+    /// [`InputError`] if the file cannot be read, has no such columns, or is the record of an arm with other scales.
     pub fn read(&self, scenario: &Scenario) -> Result<Slide, CommandError> {
         let ticks = self.ticks().map_err(|reason| InputError::Slide {
             path: self.path.clone(),
             reason,
         })?;
+        if !self.is_table() {
+            self.check_scales(scenario)?;
+        }
         let whole = ticks.len();
         Ok(slide_of(scenario, self.posture.into(), ticks, whole))
     }
 
+    fn is_table(&self) -> bool {
+        self.path.extension().is_some_and(|it| it == "csv")
+    }
+
+    /// Checks that the counts of a record mean what the scenario says; a table does not tell.
+    fn check_scales(&self, scenario: &Scenario) -> Result<(), CommandError> {
+        let differences = given_scenario::of_record(&self.path)?.differences(scenario);
+        let other = differences
+            .iter()
+            .find(|it| SCALES.contains(&it.key.as_str()));
+        other.map_or(Ok(()), |other| {
+            let [key, recorded, given] = other.cells();
+            Err(InputError::Slide {
+                path: self.path.clone(),
+                reason: format!("its {key} is {recorded}, that of the scenario {given}"),
+            }
+            .into())
+        })
+    }
+
     fn ticks(&self) -> Result<Vec<SlideTick>, String> {
         let file = input_file::open(&self.path).map_err(|error| error.to_string())?;
-        if self.path.extension().is_some_and(|it| it == "csv") {
+        if self.is_table() {
             return of_table(BufReader::new(file));
         }
         let mut table = Vec::new();
