@@ -1,6 +1,6 @@
 //! Healthy arms are identified, and their errors are as large as told.
 
-use painleve_identify::geometry::reach_m;
+use painleve_identify::geometry::{Place, reach_m};
 use painleve_identify::{Limits, Parameter, Refusal, identify};
 use painleve_shared::Posture;
 
@@ -137,13 +137,19 @@ fn slides_that_go_far_enough_are_told_that_they_shake() {
 #[test]
 fn the_distance_from_the_edges_counts_the_posture_without_a_slide() {
     let mut rig = Rig::new(FIRST_SEED);
-    let slides = rig.slides();
     let first_look = limits().of_first_look();
-    let of = |slides: &[_]| identify(slides, &rig.prior, &first_look).unwrap();
-    let both = of(&slides).tip_deviation_m;
-    let one = slides.iter().map(|slide| of(std::slice::from_ref(slide)));
-    for identified in one {
-        assert!(identified.tip_deviation_m > 3.0 * both, "{both}");
+    for slide in rig.slides() {
+        let found = identify(&[slide], &rig.prior, &first_look).unwrap();
+        let fit = &found.fit;
+        let (reach_m, reach_by) = reach_m(&fit.parameters);
+        for posture in [Posture::ElbowDown, Posture::ElbowUp] {
+            for share in [-0.95, 0.95] {
+                let place = Place::on_belt(&fit.parameters, posture, share * reach_m).unwrap();
+                let by = reach_by * share - place.tip_by;
+                let deviation_m = by.dot(&(fit.covariance * by)).sqrt();
+                assert!(found.tip_deviation_m > 0.999 * deviation_m, "{posture:?}");
+            }
+        }
     }
 }
 
@@ -166,7 +172,8 @@ fn too_much_noise_is_not_told_as_a_line_that_is_not_straight() {
 #[test]
 fn coarse_encoders_are_not_told_as_a_line_that_is_not_straight() {
     let mut rig = Rig::new(FIRST_SEED);
-    rig.count_rad *= 8.0;
+    // Between 10 and 11 bits.
+    rig.count_rad *= 13.0;
     let coarse = Limits {
         count_rad: rig.count_rad,
         ..limits()
