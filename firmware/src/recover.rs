@@ -32,6 +32,10 @@ const SEARCHING: f32 = 4.0;
 const INWARDS_PER_S: f32 = 0.5;
 /// Speed along the belt below which the tip is at rest, m/s.
 const AT_REST_M_S: f32 = 0.01;
+/// Rate at which the path moves on while friction of the joints holds the tip short of its landing point, 1/s.
+const ONWARDS_PER_S: f32 = 5.0;
+/// Farthest path beyond the landing point, m.
+const FARTHEST_BEYOND_M: f32 = 0.02;
 
 settings! {
     /// Settings of the recovery.
@@ -55,6 +59,8 @@ pub struct Flight {
     landing_m: f32,
     /// Height of the path above the belt, m.
     height_m: f32,
+    /// How far the path goes beyond the landing point, m.
+    beyond_m: f32,
     /// Whether the tip has been above its landing point. It then descends there, even if the first
     /// touch drags it along.
     lands: bool,
@@ -92,6 +98,7 @@ impl RecoverySettings {
         let flight = flight.get_or_insert(Flight {
             landing_m: model.tip_m.x,
             height_m: model.gap_m.at_least(0.0),
+            beyond_m: 0.0,
             lands: false,
             posture: Posture::of(&model.theta_rad),
             path_rad: None,
@@ -100,13 +107,18 @@ impl RecoverySettings {
         flight.touched_s = 0.0;
         // Where the belt is higher than assumed, the tip rests on it on its way: it may land there, too.
         let waits = !flight.lands && flight.height_m == CLEARANCE_M;
-        if waits && model.tip_velocity_m_s.x.abs() < AT_REST_M_S {
+        let rests = waits && model.tip_velocity_m_s.x.abs() < AT_REST_M_S;
+        if rests {
             flight.landing_m = model.tip_m.x;
         }
         if let Some((lower, upper)) = edges_m {
             flight.landing_m = flight.landing_m.limited(lower, upper);
         }
         let away = flight.landing_m - model.tip_m.x;
+        if rests {
+            let onwards_m = ONWARDS_PER_S * tick_s * away;
+            flight.beyond_m = (flight.beyond_m + onwards_m).within(FARTHEST_BEYOND_M);
+        }
         flight.lands = edges_m.is_some_and(|(lower, upper)| {
             let admissible = model.tip_m.x > lower && model.tip_m.x < upper;
             away.abs() < OVER_LANDING_PLACE_M || (flight.lands && admissible)
@@ -123,7 +135,10 @@ impl RecoverySettings {
         } else {
             CLEARANCE_M.limited(lowest_m, flight.height_m + RAISING_M_S * tick_s)
         };
-        let wanted_m = Vector2::new(flight.landing_m, flight.height_m - arm.height_m());
+        let wanted_m = Vector2::new(
+            flight.landing_m + flight.beyond_m,
+            flight.height_m - arm.height_m(),
+        );
         // A path below the belt ends at the arm's reach, most of all once the links have been found shorter. Further
         // inwards it gets deeper and presses.
         let distance_m = wanted_m.norm_squared().square_root();
@@ -153,7 +168,7 @@ impl RecoverySettings {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use painleve_shared::{ArmParameters, GeneralisedTorque};
+    use painleve_shared::{ArmParameters, GeneralisedTorque, JointTorque};
     use proptest::prelude::*;
 
     #[test]
@@ -196,6 +211,7 @@ mod tests {
         let mut state = Some(Flight {
             landing_m,
             height_m: gap_m,
+            beyond_m: 0.0,
             lands: gap_m <= 0.0,
             posture,
             path_rad: None,
@@ -231,6 +247,43 @@ mod tests {
             down > 3.0 && (landing + 0.035).abs() < 1e-6,
             "{down} {landing}"
         );
+    }
+
+    /// Coulomb friction of the joints holds the tip 5 mm away from the only place to land.
+    #[test]
+    fn a_tip_that_friction_of_the_joints_holds_short_of_its_landing_point_gets_there() {
+        const FRICTION_NM: f32 = 0.3;
+        const STEPS: u32 = 200;
+        let arm = Arm::<f32>::new(ArmParameters::default()).unwrap();
+        let tip_m = Vector2::new(-0.1065, CLEARANCE_M - arm.height_m());
+        let there = arm.link_angles_rad(&tip_m, Posture::ElbowDown).unwrap();
+        let mut theta = there + LinkMotion::new(0.0, 0.03);
+        let mut theta_dot = LinkMotion::zeros();
+        let recovery = RecoverySettings::default();
+        let mut state = None;
+        let edges = Some((tip_m.x, tip_m.x));
+        let model_of = |theta, theta_dot, friction_nm: JointTorque<f32>| {
+            Model::new(&arm, theta, theta_dot, &friction_nm.to_links())
+        };
+        let lands_at_m = (0..1000).find_map(|_| {
+            let known = model_of(theta, theta_dot, JointTorque::zeros());
+            let torque = recovery.tick(&mut state, &arm, &known, edges, 1e-3);
+            for _ in 0..STEPS {
+                let friction_nm = theta_dot
+                    .to_joints()
+                    .to_array()
+                    .map(|rate_rad_s| -FRICTION_NM * (rate_rad_s / 2e-3).limited(-1.0, 1.0));
+                let friction_nm = JointTorque::from_array(friction_nm);
+                let model = model_of(theta, theta_dot, friction_nm);
+                let step_s = 1e-3 / STEPS as f32;
+                theta_dot += model.free_acceleration_rad_s2(&torque.torque_nm) * step_s;
+                theta += theta_dot * step_s;
+            }
+            state
+                .is_some_and(|flight: Flight| flight.lands)
+                .then_some(known.tip_m.x)
+        });
+        assert!(lands_at_m.is_some_and(|place_m| (place_m - tip_m.x).abs() < OVER_LANDING_PLACE_M));
     }
 
     proptest! {
