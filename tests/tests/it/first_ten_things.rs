@@ -1,5 +1,7 @@
 //! The page "First ten things" works as printed: its commands, the schemas of its record, its Python.
 
+#![allow(clippy::unwrap_used)]
+
 use std::collections::BTreeMap;
 use std::process::Command;
 
