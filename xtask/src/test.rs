@@ -170,7 +170,7 @@ fn workspace_tests(arguments: &TestArguments) -> Result<Vec<String>, ChoreError>
     skipped.dedup();
     if !has_nextest {
         skipped.push(
-            "one by one, the tests that measure time; the list of slow tests: cargo-nextest is missing".to_owned(),
+            "the tests that measure time apart from others, and the list of slow tests: cargo-nextest is missing".to_owned(),
         );
     }
     Ok(skipped)
