@@ -44,7 +44,7 @@ use painleve_stm32f4::spi::SpiPort;
 use painleve_stm32f4::uart_dma::UartDma;
 use painleve_stm32f4::watchdogs::{Independent, Window};
 use painleve_stm32f4::{clock, flash, supply, timer};
-use stm32f4xx_hal::gpio::{ErasedPin, Input, Output, PB0, PC0, PC1, PC2, PinState};
+use stm32f4xx_hal::gpio::{ErasedPin, Input, Output, PB0, PC0, PC1, PC2, PinState, Speed};
 pub use stm32f4xx_hal::pac;
 use stm32f4xx_hal::pac::{SPI1, SPI2};
 use stm32f4xx_hal::prelude::*;
@@ -199,9 +199,11 @@ impl Board for F405 {
             polarity: Polarity::IdleLow,
             phase: Phase::CaptureOnSecondTransition,
         };
-        // At reset, two of these pins belong to the debugger, which uses them only for JTAG.
+        // At reset, two of these pins belong to the debugger, which uses them only for JTAG. With a slow clock pin the
+        // last bit of a word may be received wrongly (ES0182, delayed SCK feedback).
+        let fastest = Speed::VeryHigh;
         let pins = (
-            Some(b.pb3.into_alternate::<5>()),
+            Some(b.pb3.into_alternate::<5>().speed(fastest)),
             Some(b.pb4.into_alternate::<5>()),
             Some(b.pb5.into_alternate::<5>()),
         );
@@ -221,7 +223,8 @@ impl Board for F405 {
             word_bits: 16,
         };
         let encoders = SensorBus::new(SpiPort(spi), selects, EncoderDriver::new(), timing);
-        let pins = (Some(b.pb13), Some(b.pb14), Some(b.pb15));
+        let clock = b.pb13.into_alternate::<5>().speed(fastest);
+        let pins = (Some(clock), Some(b.pb14), Some(b.pb15));
         let spi = Spi::new(device.SPI2, pins, mode_0, FORCE_BUS_HZ.Hz(), &mut rcc);
         let (spi, _) = spi.release();
         let selects = [

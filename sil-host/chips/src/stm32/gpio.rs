@@ -49,6 +49,11 @@ impl Gpio {
         }
     }
 
+    /// Returns the speed of a pin's driver, from 0 for low to 3 for very high.
+    pub fn speed(&self, pin: usize) -> u32 {
+        self.speed >> (2 * pin) & 3
+    }
+
     /// Handles a load.
     pub fn read(&self, offset: u32) -> u32 {
         match offset {

@@ -148,6 +148,18 @@ pub trait WiredChip: Chip {
     fn next_tick(&self) -> Picoseconds;
 }
 
+/// Checks the pins of an SPI bus (0 for SPI1) before a transfer: clock, input and output, all on port B.
+pub fn check_spi_pins(port_b: &Gpio, bus: usize) {
+    const PINS: [[usize; 3]; 2] = [[3, 4, 5], [13, 14, 15]];
+    const HIGH_SPEED: u32 = 2;
+    for pin in PINS[bus] {
+        assert_eq!(port_b.pin(pin), PinMode::Alternate(5), "PB{pin}");
+    }
+    let [clock, ..] = PINS[bus];
+    // The last bit is sampled by the clock that comes back from this pin (ES0182, delayed SCK feedback).
+    assert!(port_b.speed(clock) >= HIGH_SPEED, "PB{clock} is slow");
+}
+
 /// Performs a store to a port and reports the pins that it changes; returns those to which wires lead from them.
 pub fn store_port(
     gpio: &mut Gpio,

@@ -13,7 +13,7 @@ use crate::machine::{Chip, Reset};
 use crate::stm32::{
     Adc, AdcLayout, Crystal, Dac, FlashSlots, Gpio, GpioReset, Individual, Outside, Pin, PinLevel,
     PinMode, Power, Timer, Usart, UsartLayout, Watchdog, WindowWatchdog, WiredChip, carry,
-    store_port,
+    check_spi_pins, store_port,
 };
 use crate::unicorn::Processor;
 use crate::{MICROSECOND, MILLISECOND, Picoseconds};
@@ -413,6 +413,7 @@ impl<O: Outside> Chip for Stm32f4<O> {
         self.timer.advance(self.rcc.slow_timer_hz(), now);
         for (bus, hz) in [fast, slow].into_iter().enumerate() {
             while let Some(transfer) = self.spis[bus].ended(now) {
+                check_spi_pins(&self.ports[1], bus);
                 let received = self.outside.transfer(bus, transfer, now);
                 self.spis[bus].complete(received, hz);
             }

@@ -15,7 +15,7 @@ use crate::machine::{Chip, Reset};
 use crate::stm32::{
     Adc, AdcLayout, Crystal, Dac, FlashSlots, Gpio, GpioReset, Individual, Outside, Pin, PinLevel,
     PinMode, Power, Timer, Usart, UsartLayout, Watchdog, WindowWatchdog, WiredChip, carry,
-    store_port,
+    check_spi_pins, store_port,
 };
 use crate::unicorn::Processor;
 
@@ -292,6 +292,7 @@ impl<O: Outside> Chip for Stm32g4<O> {
         self.timer.advance(hz, now);
         for bus in 0..2 {
             while let Some(transfer) = self.spis[bus].ended(now) {
+                check_spi_pins(&self.ports[1], bus);
                 let received = self.outside.transfer(bus, transfer, now);
                 self.spis[bus].complete(received, hz);
             }
