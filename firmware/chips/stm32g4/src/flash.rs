@@ -54,6 +54,8 @@ impl FlashRegisters for Registers {
             return Err(NorFlashErrorKind::Other);
         }
         self.wait().or_else(|_| self.wait())?;
+        // Reading one bank while the other one is written may corrupt the data cache (ES0430, section 2.2.2).
+        self.0.acr().modify(|_, w| w.dcen().clear_bit());
         for key in KEYS {
             // SAFETY: the keys of the manual, in its order.
             self.0.keyr().write(|w| unsafe { w.bits(key) });
@@ -63,11 +65,9 @@ impl FlashRegisters for Registers {
 
     fn close(&mut self) {
         self.0.cr().write(|w| w.lock().set_bit());
-        self.0.acr().modify(|_, w| w.dcen().clear_bit());
         self.0.acr().modify(|_, w| w.dcrst().set_bit());
-        self.0
-            .acr()
-            .modify(|_, w| w.dcrst().clear_bit().dcen().set_bit());
+        self.0.acr().modify(|_, w| w.dcrst().clear_bit());
+        self.0.acr().modify(|_, w| w.dcen().set_bit());
     }
 
     fn erase(&mut self, page: u8) {

@@ -3,6 +3,10 @@
 use crate::stm32::{FlashSlots, Power};
 use crate::{MICROSECOND, MILLISECOND, Picoseconds};
 
+/// Bits of the access control register.
+const DATA_CACHE: u32 = 1 << 10;
+const DATA_CACHE_RESET: u32 = 1 << 12;
+
 /// Bits of the control register.
 const LOCK: u32 = 1 << 31;
 const OPTION_LOCK: u32 = 1 << 30;
@@ -43,6 +47,8 @@ pub(super) struct Flash {
     programmed_options: u32,
     /// Time until which the option bytes are programmed.
     options_busy_until: Picoseconds,
+    /// Whether the data cache may hold what the slots no longer do.
+    is_cache_stale: bool,
     /// The first half of a double word that is written.
     half: Option<(u32, u32)>,
     /// Errors in the status register.
@@ -64,6 +70,7 @@ impl Flash {
             written_options: USUAL_OPTIONS,
             programmed_options: USUAL_OPTIONS,
             options_busy_until: 0,
+            is_cache_stale: false,
             half: None,
             errors: 0,
             is_uncorrectable: false,
@@ -102,6 +109,7 @@ impl Flash {
         self.registers[5] = 0xc000_0000;
         self.keys = [0; 2];
         self.slots.reset(now);
+        self.is_cache_stale = false;
         self.half = None;
         self.errors = 0;
         self.is_uncorrectable = false;
@@ -140,13 +148,30 @@ impl Flash {
             (0x0c, 0x0819_2a3b, _) if self.registers[5] & LOCK == 0 => self.keys[1] = 1,
             (0x0c, 0x4c5d_6e7f, [_, 1]) => self.registers[5] &= !OPTION_LOCK,
             (0x20, ..) if self.registers[5] & OPTION_LOCK == 0 => self.written_options = value,
-            (0x00, ..) => self.registers[0] = value,
+            (0x00, ..) => self.control_access(value),
             (0x10, ..) => self.errors &= !value,
             (0x14, ..) if self.registers[5] & LOCK == 0 => return self.control(value, now),
             (0x18, ..) if value & 1 << 31 != 0 => self.is_uncorrectable = false,
             _ => {}
         }
         Power::On
+    }
+
+    /// Stores to the access control register. The data cache is reset while it is off, and before it is on again after a
+    /// change of the slots.
+    fn control_access(&mut self, value: u32) {
+        if value & DATA_CACHE_RESET != 0 {
+            assert_eq!(self.registers[0] & DATA_CACHE, 0, "the data cache is on");
+            self.is_cache_stale = false;
+        }
+        assert!(value & DATA_CACHE == 0 || !self.is_cache_stale);
+        self.registers[0] = value;
+    }
+
+    /// Notes a change of the slots, during which the data cache must be off (ES0430, section 2.2.2).
+    fn note_change(&mut self) {
+        assert_eq!(self.registers[0] & DATA_CACHE, 0, "the data cache is on");
+        self.is_cache_stale = true;
     }
 
     fn control(&mut self, value: u32, now: Picoseconds) -> Power {
@@ -163,6 +188,7 @@ impl Flash {
             return Power::On;
         }
         assert!(value & SECOND_BANK != 0, "the program's bank");
+        self.note_change();
         let slot = ((value >> 3 & 0x7f) - FIRST_PAGE) as usize;
         self.slots.erase(slot * PAGE, PAGE, now)
     }
@@ -182,6 +208,7 @@ impl Flash {
         assert!(!self.slots.is_busy(now), "the bank is busy");
         assert_eq!(size, 4, "the width of a store");
         assert_eq!(self.registers[5] & (LOCK | PROGRAM), PROGRAM);
+        self.note_change();
         let Some((first, low)) = self.half.take() else {
             assert_eq!(offset % 8, 0);
             self.half = Some((offset, word));
