@@ -55,7 +55,9 @@ pub fn start(
     rcc.cr().modify(|_, w| w.pllon().set_bit());
     settled(comes(PATIENCE, || rcc.cr().read().pllrdy().bit_is_set()))?;
 
-    // Above 150 MHz the regulator needs its boost mode; the bus clock is halved for the change.
+    // Above 150 MHz the regulator needs its boost mode; the bus clock is halved before the change and until 1 µs after it.
+    // SAFETY: RCC_CFGR: 8 is a half.
+    rcc.cfgr().modify(|_, w| unsafe { w.hpre().bits(8) });
     rcc.apb1enr1().modify(|_, w| w.pwren().set_bit());
     let _ = rcc.apb1enr1().read();
     power.cr5().modify(|_, w| w.r1mode().clear_bit());
@@ -67,9 +69,8 @@ pub fn start(
     settled(comes(PATIENCE, || {
         flash.acr().read().latency().bits() == FLASH_WAIT_STATES
     }))?;
-    // SAFETY: RCC_CFGR: 8 is a half; 3 is the phase-locked loop.
-    rcc.cfgr()
-        .modify(|_, w| unsafe { w.hpre().bits(8).sw().bits(3) });
+    // SAFETY: 3 is the phase-locked loop.
+    rcc.cfgr().modify(|_, w| unsafe { w.sw().bits(3) });
     settled(comes(PATIENCE, || rcc.cfgr().read().sws().bits() == 3))?;
     cortex_m::asm::delay(BOOST_CYCLES);
     // SAFETY: 0 is undivided.

@@ -30,6 +30,10 @@ pub mod bus {
     pub const APB2: u32 = 0x60;
 }
 
+/// Highest clock to which the system clock is switched without a divider (chapter PWR, "Dynamic voltage scaling
+/// management"), Hz.
+const UNDIVIDED_HZ: u64 = 80_000_000;
+
 /// Longest time until the phase-locked loop has settled.
 const LOCK: Picoseconds = 40 * MICROSECOND;
 
@@ -43,6 +47,8 @@ pub struct Rcc {
     flags: u32,
     hse_ready_at: Picoseconds,
     pll_ready_at: Picoseconds,
+    /// Time of the last switch of the system clock.
+    switched_at: Picoseconds,
     /// Frequency of the crystal, Hz.
     crystal_hz: u64,
     /// Whether the crystal oscillates when switched on.
@@ -65,6 +71,7 @@ impl Rcc {
             flags: 0,
             hse_ready_at: Picoseconds::MAX,
             pll_ready_at: Picoseconds::MAX,
+            switched_at: 0,
             crystal_hz: CRYSTAL_HZ,
             crystal_works: true,
             nmi: false,
@@ -130,13 +137,36 @@ impl Rcc {
                 }
                 self.control = value;
             }
-            0x08 => self.configuration = value,
+            0x08 => self.configure(value, now),
             0x0c => self.pll = value,
             0x20 if value & 1 << 8 != 0 => self.nmi = false,
             0x94 if value & 1 << 23 != 0 => self.flags = 0,
             0x28..0x94 => self.registers[(offset / 4) as usize] = value,
             _ => {}
         }
+    }
+
+    /// Stores the configuration. The bus clock is divided before the system clock rises, and for a microsecond after that.
+    fn configure(&mut self, value: u32, now: Picoseconds) {
+        let was_divided = self.is_divided();
+        let is_switch = (self.configuration ^ value) & 3 != 0;
+        self.configuration = value;
+        if self.system_hz() <= UNDIVIDED_HZ {
+            return;
+        }
+        if is_switch {
+            assert!(was_divided, "the divider comes first");
+            self.switched_at = now;
+        }
+        assert!(
+            self.is_divided() || now >= self.switched_at + MICROSECOND,
+            "the divider goes too early"
+        );
+    }
+
+    /// Returns whether the processor's clock is that of the system divided by two or more.
+    pub fn is_divided(&self) -> bool {
+        self.configuration & 0x80 != 0
     }
 
     /// Stops the crystal; with the clock security system on, the processor continues on the internal
