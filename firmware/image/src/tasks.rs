@@ -160,7 +160,8 @@ pub fn update<D: BoardDrive, L: Law>(
     if sent.is_err() {
         *dropped_responses = dropped_responses.wrapping_add(1);
     }
-    if frame.fault != *fault {
+    // A fault that latches at a tick without a frame is recorded with the next one.
+    if frame.fault != *fault && (sensor.is_some() || frame.fault == 0) {
         *fault = frame.fault;
         if let (Some(sensor), Some(_)) = (sensor, frame.latched_fault()) {
             *fault_to_record = Some(FaultRecord {

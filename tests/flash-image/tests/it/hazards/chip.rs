@@ -3,10 +3,11 @@
 use painleve_chips::MILLISECOND;
 use painleve_chips::machine::Reset;
 use painleve_chips::stm32::Crystal;
-use painleve_flash_image::bench::{Bench, scenario};
+use painleve_flash_image::bench::{Bench, encoded, scenario};
 use painleve_flash_image::board::{BoardChip, EmulatedBoard};
-use painleve_shared::black_box::{BlackBox, Crash, ResetCause};
-use painleve_shared::message::{Request, Response};
+use painleve_shared::black_box::{BlackBox, Crash, FaultRecord, ResetCause};
+use painleve_shared::frame::SensorFrame;
+use painleve_shared::message::{FrameSource, Request, Response};
 use painleve_shared::status::Fault;
 
 use super::{DEFAULT, assert_off_in_time, driven};
@@ -25,6 +26,7 @@ crate::on_each_board! {
     a_new_chip_programs_its_brown_out_level,
     a_reset_takes_the_torque_off,
     the_black_box_outlives_a_reset_and_names_its_reason,
+    a_fault_without_a_frame_is_recorded_with_the_next_frame,
     an_unread_log_does_not_block_the_image,
     both_torques_change_at_once_over_the_whole_range,
 }
@@ -199,6 +201,26 @@ fn the_black_box_outlives_a_reset_and_names_its_reason<C: BoardChip>() {
     bench.board.machine.hang();
     bench.run_ms(30);
     assert_eq!(black_box(&mut bench.board).reset, ResetCause::Watchdog);
+}
+
+fn a_fault_without_a_frame_is_recorded_with_the_next_frame<C: BoardChip>() {
+    let mut board = EmulatedBoard::<C>::booted();
+    let response = board.configure(FrameSource::Realtime, &encoded(&scenario(DEFAULT)));
+    assert!(matches!(response, Some(Response::Ready { .. })));
+    board.machine.run_for(50 * MILLISECOND);
+    while board.response(0).is_some() {}
+    assert_eq!(black_box(&mut board).fault, None);
+    let frame = SensorFrame {
+        sequence: 1,
+        ..SensorFrame::default()
+    };
+    let answer = board.exchange(&frame).expect("an answer");
+    let record = FaultRecord {
+        sensor: frame,
+        answer,
+    };
+    assert_eq!(answer.latched_fault(), Some(Fault::MissingFrame));
+    assert_eq!(black_box(&mut board).fault, Some(record));
 }
 
 /// A debugger has attached to the log and then disconnected.
