@@ -7,7 +7,7 @@
 
 #![allow(unsafe_code)] // registers, and fields without named values
 
-use core::sync::atomic::{AtomicBool, Ordering};
+use core::sync::atomic::{AtomicBool, Ordering, compiler_fence};
 
 use embedded_storage::nor_flash::NorFlashErrorKind;
 use painleve_image::flash::FlashRegisters;
@@ -99,6 +99,8 @@ impl FlashRegisters for Registers {
 
     fn reading(&mut self, read: impl FnOnce()) {
         IS_READING.store(true, Ordering::Relaxed);
+        // Keeps the loads, which may raise the interrupt, after the store.
+        compiler_fence(Ordering::SeqCst);
         read();
         cortex_m::asm::dsb();
         IS_READING.store(false, Ordering::Relaxed);
