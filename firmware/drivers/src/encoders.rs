@@ -38,18 +38,6 @@ const CLEAR_ERROR: u16 = 0x4001;
 const ERROR_FLAG: u16 = 1 << 14;
 const DATA: u16 = 0x3fff;
 
-/// Diagnostics of an encoder's magnet.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Diagnostics(u16);
-
-impl Diagnostics {
-    /// The field is too weak (bit 11) or too strong (10), the angle cannot be computed (9), or the encoder
-    /// has not finished its start-up (8 clear).
-    pub fn is_healthy(self) -> bool {
-        self.0 & 0x0f00 == 0x0100
-    }
-}
-
 /// Position in the exchanges with one encoder.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Step {
@@ -67,8 +55,8 @@ enum Step {
 pub struct EncoderDriver {
     parts: SensorParts,
     tick: u8,
-    /// First encoders of both joints, then the second ones.
-    diagnostics: [Option<Diagnostics>; 4],
+    /// Whether the magnets are healthy; `None` before their first check. First encoders of both joints, then the second ones.
+    magnets: [Option<bool>; 4],
     readings: [Result<u16, ReadError>; 4],
     /// The encoder in turn.
     encoder: usize,
@@ -85,7 +73,7 @@ impl EncoderDriver {
         Self {
             parts: SensorParts::First,
             tick: 0,
-            diagnostics: [None; 4],
+            magnets: [None; 4],
             readings: [Err(ReadError::Bus); 4],
             encoder: 0,
             step: Step::Ask,
@@ -109,7 +97,12 @@ impl EncoderDriver {
     /// # Errors
     /// [`ReadError`] in place of a reading that is lost for this tick.
     pub fn readings(&self, bits: u8) -> [Result<EncoderCounts, ReadError>; 2] {
-        self.in_use(&self.readings).map(|angle| {
+        let [first_1, first_2, second_1, second_2] = self.readings;
+        let in_use = match self.parts {
+            SensorParts::First | SensorParts::Both => [first_1, first_2],
+            SensorParts::Second => [second_1, second_2],
+        };
+        in_use.map(|angle| {
             angle.map(|it| EncoderCounts(rescale(it.into(), BITS, bits).cast_unsigned()))
         })
     }
@@ -123,17 +116,15 @@ impl EncoderDriver {
         [[first_1, second_1], [first_2, second_2]]
     }
 
-    /// Returns the last diagnostics of the magnets of the encoders whose angles are [`readings`](Self::readings);
-    /// `None` before the first check.
-    pub fn diagnostics(&self) -> [Option<Diagnostics>; 2] {
-        self.in_use(&self.diagnostics)
-    }
-
-    /// Returns the encoders of both joints whose readings are passed on.
-    fn in_use<T: Copy>(&self, [first_1, first_2, second_1, second_2]: &[T; 4]) -> [T; 2] {
+    /// Returns whether the magnets of all encoders of a joint that are read are healthy, for both joints; `None` until each
+    /// has been checked.
+    pub fn magnets(&self) -> [Option<bool>; 2] {
+        let [first_1, first_2, second_1, second_2] = self.magnets;
         match self.parts {
-            SensorParts::First | SensorParts::Both => [*first_1, *first_2],
-            SensorParts::Second => [*second_1, *second_2],
+            SensorParts::First => [first_1, first_2],
+            SensorParts::Second => [second_1, second_2],
+            // `None` is less than `false`, and that less than `true`.
+            SensorParts::Both => [first_1.min(second_1), first_2.min(second_2)],
         }
     }
 
@@ -181,7 +172,7 @@ impl EncoderDriver {
                 }
             }
             Step::Diagnostics => {
-                self.diagnostics[self.encoder & 3] = Some(Diagnostics(checked(answer)?));
+                self.magnets[self.encoder & 3] = Some(is_healthy(checked(answer)?));
             }
         }
         let apart = self.second.wrapping_sub(self.first) & DATA;
@@ -243,6 +234,12 @@ impl Dialogue for EncoderDriver {
     }
 }
 
+/// Returns whether a magnet is healthy by its diagnostics: its field is not too weak (bit 11) nor too strong (10), the angle
+/// can be computed (9), and the encoder has finished its start-up (8).
+fn is_healthy(diagnostics: u16) -> bool {
+    diagnostics & 0x0f00 == 0x0100
+}
+
 /// Returns the data of an answer without errors.
 fn checked(answer: u16) -> Result<u16, ReadError> {
     if !answer.count_ones().is_multiple_of(2) {
@@ -276,9 +273,9 @@ mod tests {
 
     #[test]
     fn a_magnet_is_healthy_only_after_the_start_and_within_its_field() {
-        assert!(Diagnostics(0x0180).is_healthy());
+        assert!(is_healthy(0x0180));
         for ill in [0x0080, 0x0380, 0x0580, 0x0980] {
-            assert!(!Diagnostics(ill).is_healthy());
+            assert!(!is_healthy(ill));
         }
     }
 }

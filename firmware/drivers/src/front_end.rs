@@ -188,8 +188,7 @@ impl FrontEnd {
             confirm(channels, joints, pairs, reversed, tolerance, self.is_active);
         }
         self.has_new_joints = true;
-        let magnets = encoders.diagnostics();
-        self.readings.magnets = magnets.map(|it| it.map(|it| it.is_healthy()));
+        self.readings.magnets = encoders.magnets();
     }
 
     /// Takes the readings of a complete set of the force cell for the next frame.

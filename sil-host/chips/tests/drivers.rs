@@ -149,13 +149,7 @@ fn second_sensors_are_read() {
         let expected = [33, 44].map(|it| Ok(EncoderCounts(it)));
         assert_eq!(encoders.readings(encoders::BITS), expected);
     }
-    assert!(
-        driver
-            .read()
-            .diagnostics()
-            .iter()
-            .all(|it| it.unwrap().is_healthy())
-    );
+    assert_eq!(driver.read().magnets(), [Some(true); 2]);
     let (mut force_driver, force_parts) = force_cells_read(SensorParts::Second);
     force_parts[1].borrow_mut().channels = channels(BRIDGE.channels(7), BRIDGE.channels(-8));
     assert_eq!(
@@ -193,18 +187,27 @@ fn dead_lines_give_no_reading_or_a_recognisably_dead_one() {
 }
 
 #[test]
-fn a_missing_magnet_is_detected() {
-    let (mut driver, parts) = encoders();
-    for _ in 0..200 {
-        driver.read();
+fn a_missing_magnet_of_any_encoder_in_use_is_detected() {
+    for (read, in_use) in [
+        (SensorParts::First, 0..2),
+        (SensorParts::Second, 2..4),
+        (SensorParts::Both, 0..4),
+    ] {
+        for encoder in in_use {
+            let (mut driver, parts) = encoders_read(read);
+            let mut healthy = [Some(true); 2];
+            for _ in 0..200 {
+                driver.read();
+            }
+            assert_eq!(driver.read().magnets(), healthy);
+            parts[encoder].borrow_mut().diagnostics = 0x09ff;
+            for _ in 0..200 {
+                driver.read();
+            }
+            healthy[encoder % 2] = Some(false);
+            assert_eq!(driver.read().magnets(), healthy, "{read:?} {encoder}");
+        }
     }
-    let diagnostics = driver.read().diagnostics();
-    assert!(diagnostics.iter().all(|it| it.unwrap().is_healthy()));
-    parts[0].borrow_mut().diagnostics = 0x09ff;
-    for _ in 0..200 {
-        driver.read();
-    }
-    assert!(!driver.read().diagnostics()[0].unwrap().is_healthy());
 }
 
 /// One bit in ten thousand is flipped, in both directions.

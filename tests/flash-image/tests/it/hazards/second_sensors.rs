@@ -17,6 +17,7 @@ crate::on_each_board! {
     a_stuck_force_cell_is_contradicted_by_the_other,
     a_second_sensor_that_dies_takes_the_torque_off,
     without_second_sensors_the_default_arm_is_never_driven,
+    nothing_arms_on_a_second_encoder_without_a_magnet,
     healthy_second_sensors_mounted_backwards_change_nothing,
     the_second_sensors_alone_drive_the_same_arm,
     an_unknown_direction_of_a_second_encoder_is_found_with_the_first_motion,
@@ -125,6 +126,20 @@ fn without_second_sensors_the_default_arm_is_never_driven<C: BoardChip>() {
             bench.tick();
             assert!(bench.board.torque().is_off());
         }
+    }
+}
+
+fn nothing_arms_on_a_second_encoder_without_a_magnet<C: BoardChip>() {
+    const TOO_WEAK: u16 = 0x0980;
+    for joint in 0..2 {
+        let mut board = EmulatedBoard::<C>::booted();
+        board.wiring().second_encoders[joint].diagnostics = TOO_WEAK;
+        let mut bench = Bench::<C>::with_board(&scenario(DEFAULT), board);
+        for _ in 0..300 {
+            bench.tick();
+            assert!(bench.board.torque().is_off());
+        }
+        assert_eq!(latched_fault(&mut bench), Some(Fault::ArmingRefused));
     }
 }
 
