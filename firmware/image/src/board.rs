@@ -16,6 +16,8 @@ use crate::probe::SpareBits;
 pub enum StartFault {
     /// The crystal oscillator or the phase-locked loop did not settle in time.
     Clock,
+    /// The supply is too low.
+    Supply,
     /// The link to the host cannot be opened.
     Link,
     /// The brown-out level could not be programmed.

@@ -17,7 +17,7 @@ const OPTION_KEYS: [u32; 2] = [0x0819_2a3b, 0x4c5d_6e7f];
 /// crash; below 2.7 V the chip is held in reset. Feeds the watchdog meanwhile.
 ///
 /// # Errors
-/// [`StartFault::OptionBytes`].
+/// [`StartFault::Supply`] if it is below 2.9 V already; [`StartFault::OptionBytes`].
 pub fn watch(
     power: &pac::PWR,
     lines: &pac::EXTI,
@@ -25,16 +25,20 @@ pub fn watch(
     interrupts: &mut NVIC,
     watchdog: &Independent,
 ) -> Result<(), StartFault> {
+    lines.rtsr().modify(|_, w| w.tr16().set_bit());
+    lines.imr().modify(|_, w| w.mr16().set_bit());
+    // The lines already wait for the edge of a supply that falls meanwhile.
     power
         .cr()
         .modify(|_, w| unsafe { w.pls().bits(7) }.pvde().set_bit());
-    lines.rtsr().modify(|_, w| w.tr16().set_bit());
-    lines.imr().modify(|_, w| w.mr16().set_bit());
     // SAFETY: the handler takes the torque off and shares nothing; its priority is the highest, which
     // no critical section masks.
     unsafe {
         interrupts.set_priority(pac::Interrupt::PVD, 0);
         NVIC::unmask(pac::Interrupt::PVD);
+    }
+    if power.csr().read().pvdo().bit_is_set() {
+        return Err(StartFault::Supply);
     }
     raise_brown_out_level(flash, watchdog)
 }

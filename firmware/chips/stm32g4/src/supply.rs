@@ -17,7 +17,7 @@ const OPTION_KEYS: [u32; 2] = [0x0819_2a3b, 0x4c5d_6e7f];
 /// reset. The clock of the power control must be on. Feeds the watchdog meanwhile.
 ///
 /// # Errors
-/// [`StartFault::OptionBytes`].
+/// [`StartFault::Supply`] if it is below 2.9 V already; [`StartFault::OptionBytes`].
 pub fn watch(
     power: &pac::PWR,
     lines: &pac::EXTI,
@@ -26,17 +26,21 @@ pub fn watch(
     watchdog: &Independent,
 ) -> Result<(), StartFault> {
     const BELOW_2_9_V: u8 = 6;
+    lines.rtsr1().modify(|_, w| w.rt16().set_bit());
+    lines.imr1().modify(|_, w| w.im16().set_bit());
+    // The lines already wait for the edge of a supply that falls meanwhile.
     // SAFETY: PWR_CR2: a threshold.
     power
         .cr2()
         .modify(|_, w| unsafe { w.pvdls().bits(BELOW_2_9_V) }.pvde().set_bit());
-    lines.rtsr1().modify(|_, w| w.rt16().set_bit());
-    lines.imr1().modify(|_, w| w.im16().set_bit());
     // SAFETY: the handler takes the torque off and shares nothing; its priority is the highest, which
     // no critical section masks.
     unsafe {
         interrupts.set_priority(pac::Interrupt::PVD_PVM, 0);
         NVIC::unmask(pac::Interrupt::PVD_PVM);
+    }
+    if power.sr2().read().pvdo().bit_is_set() {
+        return Err(StartFault::Supply);
     }
     raise_brown_out_level(flash, watchdog)
 }

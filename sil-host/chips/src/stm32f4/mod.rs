@@ -143,6 +143,13 @@ impl<O: Outside> Stm32f4<O> {
         self.power[0] & 1 << 4 != 0 && self.supply_mv < threshold
     }
 
+    /// Passes a rising edge of the supply supervisor on to its interrupt line, which may not wait for it yet.
+    fn note_supply(&mut self, was_low: bool) {
+        if self.supply_is_low() && !was_low {
+            self.external_interrupts[5] |= self.external_interrupts[2] & 1 << 16;
+        }
+    }
+
     fn load(&mut self, address: u32, now: Picoseconds) -> u32 {
         let offset = address & 0x3ff;
         match address & !0x3ff {
@@ -208,10 +215,11 @@ impl<O: Outside> Stm32f4<O> {
             0x4000_3800 if self.rcc.is_on(0x40, 14) => {
                 self.spis[1].write(offset, value, slow, now);
             }
-            0x4000_7000 if self.rcc.is_on(0x40, 28) => match offset {
-                0x00 => self.power[0] = value,
-                _ => self.power[1] = value,
-            },
+            0x4000_7000 if self.rcc.is_on(0x40, 28) => {
+                let was_low = self.supply_is_low();
+                self.power[usize::from(offset != 0)] = value;
+                self.note_supply(was_low);
+            }
             0x4000_7400 if self.rcc.is_on(0x40, 29) => self.dac.write(offset, value),
             0x4001_1000 if self.rcc.is_on(0x44, 4) => self.usart.write(offset, value, fast, now),
             0x4001_2000 if self.rcc.is_on(0x44, 8) => {
@@ -526,15 +534,14 @@ impl<O: Outside> WiredChip for Stm32f4<O> {
     }
 
     fn set_supply(&mut self, millivolts: u32) {
+        let was_low = self.supply_is_low();
         self.supply_mv = millivolts;
         let level = self.flash_control[5] >> 2 & 3;
         let threshold = [2700, 2400, 2100, 1800][level as usize];
         if millivolts < threshold {
             self.reset = Some(Reset::BrownOut);
         }
-        if self.supply_is_low() && self.external_interrupts[2] & 1 << 16 != 0 {
-            self.external_interrupts[5] |= 1 << 16;
-        }
+        self.note_supply(was_low);
     }
 
     fn reset_pin(&mut self) {

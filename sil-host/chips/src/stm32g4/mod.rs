@@ -92,6 +92,13 @@ impl<O: Outside> Stm32g4<O> {
         self.power[1] & 1 != 0 && self.supply_mv < threshold
     }
 
+    /// Passes a rising edge of the supply supervisor on to its interrupt line, which may not wait for it yet.
+    fn note_supply(&mut self, was_low: bool) {
+        if self.supply_is_low() && !was_low {
+            self.external_interrupts[5] |= self.external_interrupts[2] & 1 << 16;
+        }
+    }
+
     fn is_on(&self, address: u32) -> bool {
         let on = |register, bit| self.rcc.is_on(register, bit);
         match address & !0x3ff {
@@ -161,7 +168,9 @@ impl<O: Outside> Stm32g4<O> {
             0x4000_3800 => self.spis[1].write(offset, (value, size), hz, now),
             0x4000_4400 => self.usart.write(offset, value, hz, now),
             0x4000_7000 => {
+                let was_low = self.supply_is_low();
                 self.power[((offset / 4) as usize).min(32)] = value;
+                self.note_supply(was_low);
                 let boosts = offset == 0x80 && value & BOOST_OFF == 0;
                 assert!(!boosts || self.rcc.is_divided(), "boost before the divider");
             }
@@ -416,14 +425,13 @@ impl<O: Outside> WiredChip for Stm32g4<O> {
     }
 
     fn set_supply(&mut self, millivolts: u32) {
+        let was_low = self.supply_is_low();
         self.supply_mv = millivolts;
         let threshold = [1700, 2000, 2200, 2500, 2800][self.flash.brown_out_level().min(4)];
         if millivolts < threshold {
             self.reset = Some(Reset::BrownOut);
         }
-        if self.supply_is_low() && self.external_interrupts[2] & 1 << 16 != 0 {
-            self.external_interrupts[5] |= 1 << 16;
-        }
+        self.note_supply(was_low);
     }
 
     fn reset_pin(&mut self) {

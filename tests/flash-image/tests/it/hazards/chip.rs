@@ -23,6 +23,7 @@ crate::on_each_board! {
     a_program_that_hangs_takes_the_torque_off,
     a_crystal_that_stops_takes_the_torque_off,
     a_low_supply_takes_the_torque_off,
+    a_board_with_a_low_supply_waits_for_a_higher_one,
     a_new_chip_programs_its_brown_out_level,
     a_reset_takes_the_torque_off,
     the_black_box_outlives_a_reset_and_names_its_reason,
@@ -141,6 +142,20 @@ fn a_low_supply_takes_the_torque_off<C: BoardChip>() {
         bench.board.machine.chip_mut().set_supply(millivolts);
         assert_off_in_time(bench);
     }
+}
+
+fn a_board_with_a_low_supply_waits_for_a_higher_one<C: BoardChip>() {
+    let mut board = EmulatedBoard::<C>::default();
+    board.machine.chip_mut().set_supply(2850);
+    board.machine.run_for(20 * MILLISECOND);
+    board.send(&Request::Identify);
+    assert_eq!(board.reply(20 * MILLISECOND), None, "it has started");
+    assert!(board.torque().is_off(), "{:?}", board.torque());
+    // The watchdog's.
+    board.machine.reset(Reset::Watchdog);
+    board.machine.chip_mut().set_supply(3300);
+    board.machine.run_for(20 * MILLISECOND);
+    assert_eq!(black_box(&mut board).crash, None);
 }
 
 /// Programming takes longer than the watchdog's limit during the start. The level counts when power has come up again.
