@@ -8,7 +8,7 @@ use painleve_firmware::law::Law;
 use painleve_firmware::supervise::lapses::Lapse;
 use painleve_firmware::{Configuration, SOURCES};
 use painleve_shared::message::{
-    FrameSource, MAXIMUM_LENGTH, MAXIMUM_RESPONSE_LENGTH, PROTOCOL, Probe, Request, Response,
+    FrameSource, MAXIMUM_RESPONSE_LENGTH, PROTOCOL, Probe, Request, Response,
 };
 use painleve_shared::stored::{StoredConfiguration, StoredState};
 use painleve_shared::wire::{self, Inbox, WireError};
@@ -23,11 +23,14 @@ use crate::stack;
 use crate::tasks::Control;
 use crate::watch::health;
 
+/// Bytes that are taken from the port at once.
+const RECEIVED_LENGTH: usize = 64;
+
 /// State of the link task between calls.
 pub struct Link<L: Law> {
     inbox: Inbox,
     decoded: Option<Configuration<L>>,
-    received: [u8; MAXIMUM_LENGTH],
+    received: [u8; RECEIVED_LENGTH],
     /// Whether a frame has been received whose answer has not been sent.
     awaits_answer: bool,
     /// The stored configuration, as found at the start or stored since; `None` before the first call.
@@ -42,7 +45,7 @@ impl<L: Law> Link<L> {
         Self {
             inbox: Inbox::new(),
             decoded: None,
-            received: [0; MAXIMUM_LENGTH],
+            received: [0; RECEIVED_LENGTH],
             awaits_answer: false,
             stored: None,
             is_changed: false,
