@@ -6,6 +6,7 @@ use painleve_firmware::Configuration;
 use painleve_firmware::drive::{ControlTask, FrameSource};
 use painleve_firmware::frame::DigitalInputs;
 use painleve_firmware::status::{Fault, SupervisorState};
+use painleve_firmware::supervise::lapses::Lapse;
 
 use crate::{Arm, ENCODERS, FORCES, INPUTS, SAMPLES, STAGES_ON, TICKS};
 
@@ -73,6 +74,8 @@ fn enable_arms_lapses_stop_and_reset_then_a_new_enable_start_again() {
 
     // Ticks without a sample, up to the limit, change nothing; one more stops.
     bench.ticks(limits.missing_frames, 0, ENABLE);
+    let lapses = bench.task.lapses().expect("configured");
+    assert_eq!(lapses.total(Lapse::MissingFrame), limits.missing_frames);
     assert_eq!(bench.ticks(60, 1, ENABLE), TRACKING);
     assert_eq!(
         bench.ticks(limits.missing_frames + 1, 0, ENABLE),
