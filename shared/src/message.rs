@@ -1,5 +1,6 @@
 //! Requests and responses that a host and a board exchange as bytes, encoded by
-//! [`wire`](crate::wire). Each request gets one response, except `Alive` and `Torque`, which get none.
+//! [`wire`](crate::wire). Each request gets one response, except `Alive` and `Torque`, which get none, and `Sensor`: a tick
+//! answers the newest.
 //!
 //! The first request carries the configuration, so one image serves every scenario.
 
