@@ -62,6 +62,12 @@ impl Checks {
         &self.verdict
     }
 
+    /// Records that a reading is missing at this tick, whichever check's turn it is.
+    #[inline]
+    pub fn note_missing(&mut self) {
+        self.plausibility.note_missing();
+    }
+
     /// Records the torques put out at a tick, and lets the check whose turn it is look at its readings. `drives`
     /// states whether the drive is active.
     pub fn tick(&mut self, readings: &SensorReadings, torques: [TorqueCounts; 2], drives: bool) {
@@ -94,5 +100,37 @@ impl Checks {
                 }
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use painleve_shared::counts::{EncoderCounts, ForceCounts};
+
+    use super::*;
+
+    /// Returns the number of ticks until healthy readings are plausible.
+    fn ticks_until_plausible(checks: &mut Checks) -> Option<u32> {
+        let readings = SensorReadings {
+            joints: [100, 200].map(|it| Some(EncoderCounts(it))),
+            forces: [Some(ForceCounts(3)); 2],
+            magnets: [Some(true); 2],
+        };
+        (1..=100).find(|_| {
+            checks.tick(&readings, [TorqueCounts(0); 2], false);
+            checks.verdict().plausible.is_ok()
+        })
+    }
+
+    #[test]
+    fn a_reading_that_is_missing_between_two_checks_counts() {
+        let mut checks = Checks::new(None, None, (14, 13));
+        assert_eq!(ticks_until_plausible(&mut checks), Some(50));
+        checks.note_missing();
+        // The verdict stays until the next check.
+        for tick in 1..TURNS {
+            assert_eq!(ticks_until_plausible(&mut checks), Some(1), "{tick}");
+        }
+        assert_eq!(ticks_until_plausible(&mut checks), Some(46));
     }
 }

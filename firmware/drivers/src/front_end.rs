@@ -258,6 +258,9 @@ impl FrontEnd {
             ),
         };
         self.is_fit = is_complete && levels.stages_ready;
+        if !is_complete {
+            self.checks.note_missing();
+        }
         if self.is_active {
             inputs.set(DigitalInputs::STAGE_NOT_READY, !levels.stages_ready);
             inputs.set(DigitalInputs::GAP_AGAINST_FORCE, contradiction);

@@ -47,7 +47,7 @@ impl SensorReadings {
 /// Checks readings every few ticks.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Plausibility {
-    /// Checks in a row with complete readings.
+    /// Checks in a row since a reading was missing.
     complete: u16,
     /// Checks in a row with both encoders at the same angle.
     same: u16,
@@ -56,6 +56,12 @@ pub struct Plausibility {
 }
 
 impl Plausibility {
+    /// Records that a reading is missing at a tick without a check.
+    #[inline]
+    pub fn note_missing(&mut self) {
+        self.complete = 0;
+    }
+
     /// Checks the readings of one tick.
     ///
     /// # Errors
