@@ -5,7 +5,8 @@
 use painleve_image::watchdogs::{IndependentLimit, IndependentWatchdog, WindowWatchdog};
 use stm32f4xx_hal::pac;
 
-/// The independent watchdog. Its oscillator has 17 to 47 kHz: it resets the chip after 2 to 6 periods.
+/// The independent watchdog. Its oscillator has 17 to 47 kHz, and it counts four of its cycles: it resets the chip after 2 to
+/// 6 periods up to 1 kHz, and after at most 7 at the highest rates.
 pub struct Independent(pub pac::IWDG);
 
 impl IndependentWatchdog for Independent {

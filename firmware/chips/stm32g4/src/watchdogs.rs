@@ -6,8 +6,8 @@ use painleve_image::watchdogs::{IndependentLimit, IndependentWatchdog, WindowWat
 
 use crate::pac;
 
-/// The independent watchdog. Its oscillator has 29.5 to 34 kHz (DS12288, LSI characteristics): it resets the chip
-/// after 2 to 2.4 periods.
+/// The independent watchdog. Its oscillator has 29.5 to 34 kHz (DS12288, LSI characteristics), and it counts four of its
+/// cycles: it resets the chip after 2 to 2.5 periods up to 1 kHz, and after at most 6 at the highest rate.
 pub struct Independent(pub pac::IWDG);
 
 impl IndependentWatchdog for Independent {
