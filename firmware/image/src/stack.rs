@@ -3,7 +3,7 @@
 #![allow(unsafe_code)] // reads and writes the stack below the program's own
 
 use core::convert::Infallible;
-use core::ptr::{addr_of, addr_of_mut};
+use core::ptr::{addr_of, addr_of_mut, null_mut};
 use core::sync::atomic::{AtomicBool, Ordering};
 
 /// Pattern of untouched stack.
@@ -52,29 +52,27 @@ pub fn is_free() -> bool {
 /// # Safety
 /// `idle` owns or refers to static values only, and nothing else refers to what is on the stack.
 pub unsafe fn empty_for<F: FnOnce() -> Infallible>(idle: F) -> ! {
-    // No interrupt may use the stack's upper end while `idle` is still in what was below it.
-    cortex_m::interrupt::disable();
-    let mut idle = core::mem::ManuallyDrop::new(idle);
-    // SAFETY: never returns, so that all below the old stack pointer is free. `resume` moves `idle`, which lies deeper in the old
-    // stack than its own frame, and permits interrupts again.
+    // What `idle` holds crosses in a register: the new stack may overwrite the place where it was.
+    const { assert!(size_of::<F>() <= 4 && align_of::<F>() <= 4) };
+    let mut held = null_mut::<()>();
+    // SAFETY: the place is large enough and aligned. The code never returns, so that the whole stack is free.
     unsafe {
+        (&raw mut held).cast::<F>().write(idle);
         core::arch::asm!(
             "msr msp, {top}",
             "bx {resume}",
             top = in(reg) addr_of!(_stack_start),
-            resume = in(reg) resume::<F> as extern "C" fn(*mut F) -> !,
-            in("r0") &raw mut *idle,
+            resume = in(reg) resume::<F> as extern "C" fn(*mut ()) -> !,
+            in("r0") held,
             options(noreturn),
         )
     }
 }
 
-extern "C" fn resume<F: FnOnce() -> Infallible>(idle: *mut F) -> ! {
-    // SAFETY: `empty_for` passes a value that is in place, and does not use it again.
-    let idle = unsafe { idle.read() };
+extern "C" fn resume<F: FnOnce() -> Infallible>(held: *mut ()) -> ! {
+    // SAFETY: `empty_for` has written it, and does not use it again.
+    let idle = unsafe { (&raw const held).cast::<F>().read() };
     IS_FREE.store(true, Ordering::Relaxed);
-    // SAFETY: nothing that was on the old stack is used from now on.
-    unsafe { cortex_m::interrupt::enable() };
     match idle() {}
 }
 

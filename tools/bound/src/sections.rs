@@ -17,7 +17,7 @@ use crate::values::{Program, Values, within};
 use crate::worst::Analysis;
 
 /// Functions whose sections are left out, with the reason.
-pub const LEFT_OUT: [(&str, &str); 6] = [
+pub const LEFT_OUT: [(&str, &str); 5] = [
     ("link::stop", "the torque is taken off"),
     (
         "link::configure",
@@ -26,7 +26,6 @@ pub const LEFT_OUT: [(&str, &str); 6] = [
     ("tasks::panicked", "the torque is taken off"),
     ("main", "the start: no task runs"),
     ("main::__rtic_init_resources", "the start: no task runs"),
-    ("stack::empty_for", "the end of the start"),
 ];
 
 /// Functions that end the program: no path leads on from them.
