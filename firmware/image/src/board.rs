@@ -8,6 +8,7 @@ use painleve_shared::black_box::ResetCause;
 use painleve_shared::frame::SensorFrame;
 use painleve_shared::message::{FrameSource, RefusedRate};
 
+use crate::dma_serial::{DmaBytes, DmaRegisters};
 use crate::memory::FlashMemory;
 use crate::probe::SpareBits;
 
@@ -29,7 +30,7 @@ pub struct Parts<B: Board> {
     /// Part of the control task.
     pub drive: B::Drive,
     /// Part of the serial port's interrupt.
-    pub bytes: B::Bytes,
+    pub bytes: DmaBytes<B::Serial>,
     /// Part of the link task.
     pub port: B::Port,
     /// Part of the link task: keeps a configuration.
@@ -42,8 +43,8 @@ pub trait Board {
     type Device;
     /// Type that the control task owns.
     type Drive: BoardDrive;
-    /// Type that the serial port's interrupt owns.
-    type Bytes: Bytes;
+    /// Registers of the serial port.
+    type Serial: DmaRegisters;
     /// Type that the link task owns.
     type Port: Port;
     /// Flash that keeps a configuration over a loss of power.
@@ -58,9 +59,7 @@ pub trait Board {
         Self: Sized;
 
     /// Returns the reason for the processor's last reset, and clears it.
-    fn reset_cause() -> ResetCause {
-        ResetCause::Unknown
-    }
+    fn reset_cause() -> ResetCause;
 
     /// Handles a non-maskable interrupt of the configuration's memory; returns whether it was one. Any other is
     /// that of a stopped crystal.
@@ -82,16 +81,13 @@ pub trait Board {
 /// input for frames from the host instead of the board's own sensors.
 pub trait BoardDrive: Drive {
     /// Bits that a host may change while nothing is driven.
-    const SPARE: &'static [SpareBits] = &[];
+    const SPARE: &'static [SpareBits];
 
     /// Checks that the board can watch over ticks at this rate, with frames from `source`.
     ///
     /// # Errors
     /// The rate, and the nearest ones at which it can.
-    fn check_rate(&self, tick_hz: f32, source: FrameSource) -> Result<(), RefusedRate> {
-        let _ = (tick_hz, source);
-        Ok(())
-    }
+    fn check_rate(&self, tick_hz: f32, source: FrameSource) -> Result<(), RefusedRate>;
 
     /// Starts the control timer's interrupt at the configuration's rate, with frames from `source`.
     /// Discards a frame offered before.
@@ -100,31 +96,19 @@ pub trait BoardDrive: Drive {
     /// Returns to the control rate of a board without a configuration. The torque is off. Building the
     /// next controller may take longer than a tick of the last one, and must not look like a program
     /// that hangs.
-    fn idle(&mut self) {}
+    fn idle(&mut self);
 
     /// Takes the newest frame from the link, for a plant that the host simulates.
     fn offer(&mut self, frame: SensorFrame);
 
-    /// Permits or forbids the drive to arm; returns whether it may. A board without torque stages never
-    /// permits it.
-    fn permit_arming(&mut self, permitted: bool) -> bool {
-        let _ = permitted;
-        false
-    }
+    /// Permits or forbids the drive to arm; returns whether it may.
+    fn permit_arming(&mut self, permitted: bool) -> bool;
 
     /// Serves the interrupt of one of the sensors' buses, by its number in [`tasks!`](crate::tasks!).
-    fn serve_sensor_bus(&mut self, bus: usize) {
-        let _ = bus;
-    }
+    fn serve_sensor_bus(&mut self, bus: usize);
 
     /// Returns the frequency of [`Drive::stopwatch`], Hz.
     fn stopwatch_hz(&self) -> u32;
-}
-
-/// The serial interrupt's part of a board.
-pub trait Bytes {
-    /// Moves bytes between the port and its buffers.
-    fn serve(&mut self);
 }
 
 /// The link task's part of a board: bytes to and from the host.

@@ -8,7 +8,7 @@ use core::sync::atomic::{AtomicU8, Ordering};
 
 use heapless::spsc::{Consumer, Producer, Queue};
 
-use crate::board::{Bytes, Port};
+use crate::board::Port;
 
 /// Line speed of the link to the host, bit/s.
 pub const BAUD: u32 = 921_600;
@@ -90,8 +90,9 @@ pub fn split<R: DmaRegisters>(mut registers: R) -> Option<(DmaBytes<R>, DmaPort<
     Some((bytes, port))
 }
 
-impl<R: DmaRegisters> Bytes for DmaBytes<R> {
-    fn serve(&mut self) {
+impl<R: DmaRegisters> DmaBytes<R> {
+    /// Moves bytes between the port and its buffers.
+    pub fn serve(&mut self) {
         self.registers.acknowledge();
         if self.is_sending && !self.registers.has_sent() {
             return;

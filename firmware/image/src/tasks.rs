@@ -238,12 +238,13 @@ pub fn panicked<B: Board>(info: &PanicInfo<'_>) -> ! {
 macro_rules! tasks {
     (
         board = $board:ty, laws = $laws:ty, device = $($device:ident)::+,
-        control = $control:ident, update = $update:ident, serial = $serial:ident, link = $link:ident
-        $(, sensors = [$($task:ident($number:literal): $bus:ident),+])?
+        control = $control:ident, update = $update:ident, serial = $serial:ident, link = $link:ident,
+        sensors = [$($task:ident($number:literal): $bus:ident),+]
     ) => {
         #[::rtic::app(device = $($device)::+, peripherals = true)]
         mod tasks {
-            use $crate::board::{Board, BoardDrive, Bytes, Parts};
+            use $crate::board::{Board, BoardDrive, Parts};
+            use $crate::dma_serial::DmaBytes;
             use $crate::heapless::spsc::{Consumer, Producer, Queue};
             use $crate::painleve_shared::message::Response;
             use $crate::link::Link;
@@ -265,7 +266,7 @@ macro_rules! tasks {
 
             #[local]
             struct Local {
-                bytes: <Hardware as Board>::Bytes,
+                bytes: DmaBytes<<Hardware as Board>::Serial>,
                 port: <Hardware as Board>::Port,
                 memory: FlashMemory<<Hardware as Board>::Flash>,
                 answers_in: Producer<'static, Response>,
@@ -316,14 +317,14 @@ macro_rules! tasks {
                 rtic::pend(LINK);
             }
 
-            $($(
+            $(
                 #[task(binds = $bus, priority = 3, shared = [control])]
                 fn $task(mut cx: $task::Context) {
                     cx.shared
                         .control
                         .lock(|control| control.task.drive_mut().serve_sensor_bus($number));
                 }
-            )+)?
+            )+
 
             #[task(binds = $serial, priority = 2, local = [bytes])]
             fn serial(cx: serial::Context) {

@@ -31,7 +31,7 @@ use painleve_drivers::front_end::InputLevels;
 use painleve_drivers::stages::NO_TORQUE;
 use painleve_image::arm_drive::{ArmDrive, ArmPins};
 use painleve_image::board::{Board, Parts, StartFault};
-use painleve_image::dma_serial::{self, BAUD, DmaBytes};
+use painleve_image::dma_serial::{self, BAUD};
 use painleve_image::flash::{ConfigurationFlash, FlashRegisters};
 use painleve_image::memory::FlashMemory;
 use painleve_image::probe::{SYSTICK, SpareBits};
@@ -155,7 +155,7 @@ pub struct F405;
 impl Board for F405 {
     type Device = pac::Peripherals;
     type Drive = ArmDrive<F405Pins>;
-    type Bytes = DmaBytes<UartDma>;
+    type Serial = UartDma;
     type Port = Link;
     type Flash = ConfigurationFlash<flash::Registers>;
 

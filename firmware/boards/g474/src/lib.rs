@@ -28,7 +28,7 @@ use painleve_drivers::front_end::InputLevels;
 use painleve_drivers::stages::NO_TORQUE;
 use painleve_image::arm_drive::{ArmDrive, ArmPins};
 use painleve_image::board::{Board, Parts, StartFault};
-use painleve_image::dma_serial::{self, BAUD, DmaBytes, DmaPort};
+use painleve_image::dma_serial::{self, BAUD, DmaPort};
 use painleve_image::flash::{ConfigurationFlash, FlashRegisters};
 use painleve_image::memory::FlashMemory;
 use painleve_image::probe::{SYSTICK, SpareBits};
@@ -139,7 +139,7 @@ pub struct G474;
 impl Board for G474 {
     type Device = pac::Peripherals;
     type Drive = ArmDrive<G474Pins>;
-    type Bytes = DmaBytes<Usart2Dma>;
+    type Serial = Usart2Dma;
     type Port = DmaPort<Usart2Dma>;
     type Flash = ConfigurationFlash<flash::Registers>;
 
