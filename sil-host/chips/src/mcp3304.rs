@@ -78,6 +78,9 @@ impl SpiPart for Mcp3304 {
         if transfer.hz > FASTEST_HZ {
             self.violate("MCP3304: clock beyond 2.1 MHz");
         }
+        if transfer.idles_high != transfer.second_edge {
+            self.violate("MCP3304: not in SPI mode 0 or 3");
+        }
         let selected = self.selected.unwrap_or(now);
         if std::mem::take(&mut self.is_first) && transfer.start < selected + SELECT_SETUP {
             self.violate("MCP3304: clock less than 100 ns after select");

@@ -22,6 +22,12 @@ impl Dac {
         };
     }
 
+    /// Returns the codes at the outputs: 0 for a channel that is off.
+    pub fn outputs(&self) -> [u32; 2] {
+        let [one, two] = self.codes;
+        [one * (self.control & 1), two * (self.control >> 16 & 1)]
+    }
+
     /// Handles a load.
     pub fn read(&self, offset: u32) -> u32 {
         match offset {

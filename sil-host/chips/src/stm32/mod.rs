@@ -96,7 +96,7 @@ pub trait WiredChip: Chip {
     /// Drives a pin from outside, or releases it.
     fn drive_pin(&mut self, pin: Pin, level: Option<bool>);
 
-    /// Returns the codes of the digital-to-analog converter.
+    /// Returns the codes at the outputs of the digital-to-analog converter.
     fn dac_codes(&self) -> [u32; 2];
 
     /// Returns whether an output buffer limits the converter's range.
@@ -152,12 +152,17 @@ pub trait WiredChip: Chip {
 pub fn check_spi_pins(port_b: &Gpio, bus: usize) {
     const PINS: [[usize; 3]; 2] = [[3, 4, 5], [13, 14, 15]];
     const HIGH_SPEED: u32 = 2;
-    for pin in PINS[bus] {
-        assert_eq!(port_b.pin(pin), PinMode::Alternate(5), "PB{pin}");
-    }
+    check_function(port_b, PINS[bus], 5);
     let [clock, ..] = PINS[bus];
     // The last bit is sampled by the clock that comes back from this pin (ES0182, delayed SCK feedback).
     assert!(port_b.speed(clock) >= HIGH_SPEED, "PB{clock} is slow");
+}
+
+/// Checks that pins belong to the peripheral that uses them, by the number of its function.
+pub fn check_function<const N: usize>(port: &Gpio, pins: [usize; N], function: u8) {
+    for pin in pins {
+        assert_eq!(port.pin(pin), PinMode::Alternate(function), "pin {pin}");
+    }
 }
 
 /// Performs a store to a port and reports the pins that it changes; returns those to which wires lead from them.

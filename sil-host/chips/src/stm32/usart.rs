@@ -11,6 +11,9 @@ const RECEIVED: u32 = 1 << 5;
 const COMPLETE: u32 = 1 << 6;
 const EMPTY: u32 = 1 << 7;
 
+/// Rate of the host's end, bit/s.
+const HOST_BAUD: u64 = 921_600;
+
 /// The two arrangements of a USART's registers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum UsartLayout {
@@ -144,7 +147,11 @@ impl Usart {
                 self.flags &= !(value & (OVERRUN | FRAMING | IDLE | COMPLETE | 5));
             }
             Register::ToSend if self.is_enabled() => self.send(value as u8, clock_hz, now),
-            Register::Baud => self.baud = value,
+            Register::Baud => {
+                let apart_hz = clock_hz.abs_diff(u64::from(value) * HOST_BAUD);
+                assert!(apart_hz <= clock_hz / 50, "{clock_hz} Hz / {value}");
+                self.baud = value;
+            }
             Register::Control(number) => self.control[number] = value,
             _ => {}
         }

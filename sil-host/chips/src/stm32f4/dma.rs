@@ -62,10 +62,15 @@ impl Dma {
                 }
             }
             0x10..0xd0 => {
-                let stream = &mut self.streams[((offset - 0x10) / 0x18) as usize];
-                match (offset - 0x10) % 0x18 {
+                let number = ((offset - 0x10) / 0x18) as usize;
+                let stream = &mut self.streams[number];
+                let register = (offset - 0x10) % 0x18;
+                let is_enabled = stream.control & ENABLED != 0;
+                assert!(!is_enabled || register == 0, "stream {number} is enabled");
+                match register {
                     0x00 => {
-                        if value & ENABLED != 0 && stream.control & ENABLED == 0 {
+                        if value & ENABLED != 0 && !is_enabled {
+                            assert_eq!(self.flags[number], 0, "flags of stream {number}");
                             stream.length = stream.left;
                         }
                         stream.control = value;

@@ -13,7 +13,7 @@ use crate::machine::{Chip, Reset};
 use crate::stm32::{
     Adc, AdcLayout, Crystal, Dac, FlashSlots, Gpio, GpioReset, Individual, Outside, Pin, PinLevel,
     PinMode, Power, Timer, Usart, UsartLayout, Watchdog, WindowWatchdog, WiredChip, carry,
-    check_spi_pins, store_port,
+    check_function, check_spi_pins, store_port,
 };
 use crate::unicorn::Processor;
 use crate::{MICROSECOND, MILLISECOND, Picoseconds};
@@ -25,6 +25,10 @@ const SPIS: [usize; 2] = [35, 36];
 const USART1: usize = 37;
 const DMA1_STREAMS: [usize; 8] = [11, 12, 13, 14, 15, 16, 17, 47];
 const DMA2_STREAMS: [usize; 8] = [56, 57, 58, 59, 60, 68, 69, 70];
+
+/// Pins of port A for the serial port, and the number of their function.
+const USART_PINS: [usize; 2] = [9, 10];
+const USART_FUNCTION: u8 = 7;
 
 /// Addresses of data registers that DMA serves.
 const USART1_DATA: u32 = 0x4001_1004;
@@ -226,7 +230,7 @@ impl<O: Outside> Stm32f4<O> {
                 let (dac, outside) = (&self.dac, &mut self.outside);
                 let sample = |channel: u32| {
                     let channel = (channel - 4) as usize;
-                    outside.code_at_output(channel, dac.codes[channel])
+                    outside.code_at_output(channel, dac.outputs()[channel])
                 };
                 self.adc.write((offset, value), now, sample);
             }
@@ -429,12 +433,14 @@ impl<O: Outside> Chip for Stm32f4<O> {
         loop {
             self.usart.advance(fast, now);
             if self.usart.wants_reading() && self.dma[1].serves(USART1_DATA, true) {
+                check_function(&self.ports[0], USART_PINS, USART_FUNCTION);
                 let byte = self.usart.take();
                 self.dma[1].store_byte(USART1_DATA, byte, memory);
             }
             if self.usart.wants_writing()
                 && let Some(byte) = self.dma[1].load_byte(USART1_DATA, memory)
             {
+                check_function(&self.ports[0], USART_PINS, USART_FUNCTION);
                 self.usart.bring(byte, fast, now);
             }
             if self.usart.next_event() > now {
@@ -522,7 +528,7 @@ impl<O: Outside> WiredChip for Stm32f4<O> {
     }
 
     fn dac_codes(&self) -> [u32; 2] {
-        self.dac.codes
+        self.dac.outputs()
     }
 
     fn dac_is_buffered(&self) -> bool {

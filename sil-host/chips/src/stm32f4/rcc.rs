@@ -123,7 +123,16 @@ impl Rcc {
                 self.control = value;
             }
             0x04 => self.pll = value,
-            0x08 => self.configuration = value,
+            0x08 => {
+                let is_ready = match value & 3 {
+                    0 => true,
+                    1 => self.crystal_is_ready(now),
+                    _ => self.pll_is_ready(now),
+                };
+                let is_switch = (self.configuration ^ value) & 3 != 0;
+                assert!(is_ready || !is_switch, "the clock is not ready");
+                self.configuration = value;
+            }
             0x0c => {
                 self.interrupts = value & 0x7f00;
                 if value & 1 << 23 != 0 {

@@ -15,7 +15,7 @@ use crate::machine::{Chip, Reset};
 use crate::stm32::{
     Adc, AdcLayout, Crystal, Dac, FlashSlots, Gpio, GpioReset, Individual, Outside, Pin, PinLevel,
     PinMode, Power, Timer, Usart, UsartLayout, Watchdog, WindowWatchdog, WiredChip, carry,
-    check_spi_pins, store_port,
+    check_function, check_spi_pins, store_port,
 };
 use crate::unicorn::Processor;
 
@@ -24,6 +24,10 @@ const PVD: usize = 1;
 const TIM2: usize = 28;
 const SPIS: [usize; 2] = [35, 36];
 const USART2: usize = 38;
+
+/// Pins of port A for the serial port, and the number of their function.
+const USART_PINS: [usize; 2] = [2, 3];
+const USART_FUNCTION: u8 = 7;
 
 /// Requests of USART2.
 const RECEIVED: Request = Request {
@@ -191,7 +195,7 @@ impl<O: Outside> Stm32g4<O> {
                 let (dac, outside) = (&self.dac, &mut self.outside);
                 let sample = |channel: u32| {
                     let channel = usize::from(channel != 17);
-                    outside.code_at_output(channel, dac.codes[channel])
+                    outside.code_at_output(channel, dac.outputs()[channel])
                 };
                 self.adc.write((offset, value), now, sample);
             }
@@ -310,12 +314,14 @@ impl<O: Outside> Chip for Stm32g4<O> {
         loop {
             self.usart.advance(hz, now);
             if self.usart.wants_reading() && self.dma.serves(RECEIVED) {
+                check_function(&self.ports[0], USART_PINS, USART_FUNCTION);
                 let byte = self.usart.take();
                 self.dma.store_byte(RECEIVED, byte, memory);
             }
             if self.usart.wants_writing()
                 && let Some(byte) = self.dma.load_byte(TO_SEND, memory)
             {
+                check_function(&self.ports[0], USART_PINS, USART_FUNCTION);
                 self.usart.bring(byte, hz, now);
             }
             if self.usart.next_event() > now {
@@ -413,7 +419,7 @@ impl<O: Outside> WiredChip for Stm32g4<O> {
     }
 
     fn dac_codes(&self) -> [u32; 2] {
-        self.dac.codes
+        self.dac.outputs()
     }
 
     fn dac_is_buffered(&self) -> bool {

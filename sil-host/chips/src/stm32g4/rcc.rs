@@ -155,6 +155,7 @@ impl Rcc {
             return;
         }
         if is_switch {
+            assert!(self.pll_is_ready(now), "the clock is not ready");
             assert!(was_divided, "the divider comes first");
             self.switched_at = now;
         }
