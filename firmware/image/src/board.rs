@@ -10,6 +10,7 @@ use painleve_shared::message::{FrameSource, RefusedRate};
 
 use crate::dma_serial::{DmaBytes, DmaRegisters};
 use crate::memory::FlashMemory;
+use crate::port::Port;
 use crate::probe::SpareBits;
 
 /// Reason for a failed start of a board.
@@ -109,20 +110,4 @@ pub trait BoardDrive: Drive {
 
     /// Returns the frequency of [`Drive::stopwatch`], Hz.
     fn stopwatch_hz(&self) -> u32;
-}
-
-/// The link task's part of a board: bytes to and from the host.
-pub trait Port {
-    /// Returns whether the host sends nothing until its last frame is answered, and [`receive`](Self::receive) waits for
-    /// it. The port of a chip does neither.
-    fn is_half_duplex(&self) -> bool {
-        false
-    }
-
-    /// Moves received bytes into `buffer`; returns their number, 0 if there are none.
-    fn receive(&mut self, buffer: &mut [u8]) -> usize;
-
-    /// Sends all bytes or, if the host does not accept them, none. A port that keeps bytes until the line is free also refuses
-    /// them if it could not keep `spare` others after them.
-    fn send(&mut self, bytes: &[u8], spare: usize) -> bool;
 }

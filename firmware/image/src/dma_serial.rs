@@ -8,7 +8,7 @@ use core::sync::atomic::{AtomicU8, Ordering};
 
 use heapless::spsc::{Consumer, Producer, Queue};
 
-use crate::board::Port;
+use crate::port::Port;
 
 /// Line speed of the link to the host, bit/s.
 pub const BAUD: u32 = 921_600;

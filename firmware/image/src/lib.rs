@@ -17,6 +17,7 @@ pub mod dma_serial;
 pub mod flash;
 pub mod link;
 pub mod memory;
+pub mod port;
 pub mod probe;
 pub mod protection;
 pub mod sensor_bus;

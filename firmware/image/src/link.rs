@@ -16,8 +16,9 @@ use rtic::Mutex;
 use serde::de::DeserializeOwned;
 
 use crate::black_box;
-use crate::board::{BoardDrive, Port};
+use crate::board::BoardDrive;
 use crate::memory::FlashMemory;
+use crate::port::Port;
 use crate::probe;
 use crate::stack;
 use crate::tasks::Control;

@@ -20,8 +20,8 @@
 use core::sync::atomic::{AtomicU32, Ordering};
 
 use cortex_m::peripheral::DWT;
-use painleve_image::board::Port;
 use painleve_image::dma_serial::DmaPort;
+use painleve_image::port::Port;
 use painleve_stm32f4::uart_dma::UartDma;
 use semihosting::fd::{BorrowedFd, RawFd};
 use semihosting::sys::arm_compat::{OpenMode, sys_open, sys_read_orig, sys_write_orig};
