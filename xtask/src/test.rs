@@ -55,8 +55,8 @@ type Step = fn() -> Result<(), ChoreError>;
 /// Installs missing tools, builds images and program, and runs the tests of a tier.
 ///
 /// # Errors
-/// If a step fails. What the tests need ends the run if it cannot be built; any other step leaves the later ones to run, of
-/// which `--all` has an hour.
+/// If a step fails. A failure to build what the tests need ends the run; after any other one the later steps still run, since
+/// `--all` takes an hour.
 pub fn run(arguments: &TestArguments) -> Result<(), ChoreError> {
     let start = Instant::now();
     let tools = if arguments.all {

@@ -39,7 +39,7 @@ pub(super) const EFFECTS: &[RigEffect] = effects! {
         [0.005, 0.01, 0.02, 0.05, 0.1], typical 0.01,
         overrides: Computed(|level, drawn| torque_fault("stuck", level, drawn));
 
-    "everything": "23 of the effects above at once", "of the typical levels",
+    "everything": "many of the effects above at once", "of the typical levels",
         [0.25, 0.5, 1.0, 2.0], typical 1.0,
         compliant_only: true,
         largest_friction: Some(largest_friction_of_everything),
