@@ -194,6 +194,17 @@ pub fn rows<S: Study>(study: &S, done: impl Fn() + Sync) -> Result<Vec<S::Row>, 
 mod tests {
     use super::*;
 
+    #[test]
+    fn every_combination_has_its_index() {
+        let counts = [2, 1, 3];
+        let all: Vec<_> = (0..combinations(&counts))
+            .map(|index| places(index, counts))
+            .collect();
+        assert_eq!(all[1], [1, 0, 0]);
+        assert_eq!(all[5], [1, 0, 2]);
+        assert!((0..6).all(|index| all[..index].iter().all(|it| *it != all[index])));
+    }
+
     struct Squares;
 
     impl Study for Squares {

@@ -62,3 +62,14 @@ fn or_all<T: Copy + PartialEq>(chosen: &[T], all: &[T]) -> Vec<T> {
     }
     once
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_given_twice_is_chosen_once() {
+        assert_eq!(or_all(&[3, 1, 3], &[1, 2, 3]), [3, 1]);
+        assert_eq!(or_all(&[], &[1, 2, 3]), [1, 2, 3]);
+    }
+}
