@@ -181,6 +181,11 @@ impl<L: Law> Controller<L> {
         &self.stages.supervisor.lapses
     }
 
+    /// Returns the same, for a drive that stands in for the controller.
+    pub(crate) fn lapses_mut(&mut self) -> &mut LapseMonitor {
+        &mut self.stages.supervisor.lapses
+    }
+
     #[inline]
     fn answer_into(&mut self, frame: &SensorFrame, telemetry: Option<&mut Telemetry>) {
         if !matches!(self.due, Due::Nothing) {

@@ -31,12 +31,11 @@ pub struct OpenLoop {
     age: u32,
     /// Readings when the drive was armed; `None` while it is not.
     armed_at: Option<[EncoderCounts; 2]>,
-    lapses: LapseMonitor,
     last: ActuatorFrame,
 }
 
 impl OpenLoop {
-    /// Makes a drive that is not armed, with the configuration's limits of torque and lapses.
+    /// Makes a drive that is not armed, with the configuration's torque limit.
     pub fn new<L: Law>(configuration: &Configuration<L>) -> Self {
         let (converters, settings) = (&configuration.converters, &configuration.settings);
         let [encoder, _] = converters.encoders;
@@ -48,7 +47,6 @@ impl OpenLoop {
             torques: [TorqueCounts(0); 2],
             age: 0,
             armed_at: None,
-            lapses: LapseMonitor::new(settings.lapses),
             last: ActuatorFrame::default(),
         }
     }
@@ -61,11 +59,11 @@ impl OpenLoop {
         }
     }
 
-    /// Answers one sensor frame.
+    /// Answers one sensor frame, and counts its lapses.
     // Out of line: it must not take the place of the law in the control interrupt.
     #[cold]
     #[inline(never)]
-    pub fn tick(&mut self, frame: &SensorFrame) -> &ActuatorFrame {
+    pub fn tick(&mut self, frame: &SensorFrame, lapses: &mut LapseMonitor) -> &ActuatorFrame {
         let is_enabled = frame.inputs.contains(DigitalInputs::ENABLE) && self.last.fault == 0;
         let is_readable = frame.joints.iter().all(|it| self.encoder.contains(*it));
         match self.armed_at {
@@ -73,7 +71,7 @@ impl OpenLoop {
             Some(start) if self.has_moved_far(start, frame.joints) => {
                 self.latch(Fault::MovedTooFar);
             }
-            Some(_) => self.note_lapses(frame.inputs, is_readable),
+            Some(_) => self.note_lapses(lapses, frame.inputs, is_readable),
             // A missing reading shows no motion from it.
             None if is_readable => self.armed_at = Some(frame.joints),
             None => {}
@@ -107,9 +105,9 @@ impl OpenLoop {
 
     /// Latches the fault of a lapse that occurs too often, in place of the controller, which does not run. Forces are
     /// not needed here.
-    fn note_lapses(&mut self, inputs: DigitalInputs, is_readable: bool) {
+    fn note_lapses(&mut self, lapses: &mut LapseMonitor, inputs: DigitalInputs, is_readable: bool) {
         let mut note = |lapse: Lapse, occurs: bool| {
-            if self.lapses.note(lapse, u32::from(occurs)) {
+            if lapses.note(lapse, u32::from(occurs)) {
                 self.latch(lapse.fault());
             }
         };
@@ -152,10 +150,36 @@ mod tests {
 
     const REQUEST: [TorqueCounts; 2] = [TorqueCounts(100), TorqueCounts(-2000)];
 
-    fn open_loop() -> OpenLoop {
-        let mut configuration = Configuration::<LawSettings>::default();
+    /// A drive in open loop, with the lapses that it counts.
+    struct Tested {
+        open_loop: OpenLoop,
+        lapses: LapseMonitor,
+    }
+
+    impl Tested {
+        fn tick(&mut self, frame: &SensorFrame) -> &ActuatorFrame {
+            self.open_loop.tick(frame, &mut self.lapses)
+        }
+
+        fn request(&mut self, torques: [TorqueCounts; 2]) {
+            self.open_loop.request(torques);
+        }
+    }
+
+    fn at_rate(tick_hz: f32) -> Tested {
+        let mut configuration = Configuration::<LawSettings> {
+            tick_hz,
+            ..Default::default()
+        };
         configuration.settings.torque_limit_nm = 1.0;
-        OpenLoop::new(&configuration)
+        Tested {
+            open_loop: OpenLoop::new(&configuration),
+            lapses: LapseMonitor::new(configuration.settings.lapses),
+        }
+    }
+
+    fn open_loop() -> Tested {
+        at_rate(1000.0)
     }
 
     fn frame(tick: u32, joint: u32, inputs: DigitalInputs) -> SensorFrame {
@@ -249,6 +273,14 @@ mod tests {
     }
 
     #[test]
+    fn lapses_are_counted() {
+        let mut open_loop = open_loop();
+        open_loop.tick(&frame(0, 100, DigitalInputs::ENABLE));
+        open_loop.tick(&frame(1, u32::MAX, DigitalInputs::ENABLE));
+        assert_eq!(open_loop.lapses.total(Lapse::EncoderOutOfRange), 1);
+    }
+
+    #[test]
     fn an_encoder_that_stays_silent_takes_the_torque_off() {
         let silent = frame(1, u32::MAX, DigitalInputs::ENABLE);
         assert_eq!(latched_by(&silent), Some((Fault::EncoderOutOfRange, 2)));
@@ -257,12 +289,7 @@ mod tests {
 
     #[test]
     fn a_torque_acts_at_the_lowest_rate() {
-        let mut configuration = Configuration::<LawSettings> {
-            tick_hz: 10.0,
-            ..Default::default()
-        };
-        configuration.settings.torque_limit_nm = 1.0;
-        let mut open_loop = OpenLoop::new(&configuration);
+        let mut open_loop = at_rate(10.0);
         open_loop.tick(&frame(0, 100, DigitalInputs::ENABLE));
         open_loop.request(REQUEST);
         let answer = *open_loop.tick(&frame(1, 100, DigitalInputs::ENABLE));

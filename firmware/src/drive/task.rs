@@ -203,7 +203,7 @@ impl<D: Drive, L: Law> ControlTask<D, L> {
         let start = self.drive.stopwatch();
         let answer = match &mut self.open_loop {
             None => controller.answer(frame),
-            Some(open_loop) => open_loop.tick(frame),
+            Some(open_loop) => open_loop.tick(frame, controller.lapses_mut()),
         };
         self.elapsed = self.drive.stopwatch().wrapping_sub(start);
         self.drive.actuate(answer);
