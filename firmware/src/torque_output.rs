@@ -1,8 +1,8 @@
 //! Converts a law's torque to counts: checked, limited and rounded.
 
-use painleve_shared::JointTorque;
 use painleve_shared::counts::{LinearConverter, LinearScale, TorqueCounts};
 use painleve_shared::status::Fault;
+use painleve_shared::{JointTorque, Real};
 
 use crate::last_command::LastCommand;
 use crate::law::LawOutput;
@@ -19,7 +19,8 @@ impl TorqueOutput {
     /// Makes an output with this scale, of which ±`limit_nm` (N·m) is used.
     pub fn new(scale: LinearScale<f32>, limit_nm: f32) -> Self {
         let converter = scale.converter();
-        let (limit, _) = converter.counts(limit_nm);
+        let limit = (limit_nm / converter.per_count).truncate_to_i32();
+        let limit = limit.min(converter.maximum_counts);
         Self { converter, limit }
     }
 

@@ -198,7 +198,7 @@ mod tests {
         open_loop.request(REQUEST);
         for tick in 1..=50 {
             let answer = open_loop.tick(&frame(tick, 100, DigitalInputs::ENABLE));
-            assert_eq!(answer.torques, [TorqueCounts(100), TorqueCounts(-410)]);
+            assert_eq!(answer.torques, [TorqueCounts(100), TorqueCounts(-409)]);
             assert_eq!(answer.supervisor_state(), Some(SupervisorState::Armed));
             assert_eq!(answer.tick, tick);
         }
