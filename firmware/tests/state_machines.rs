@@ -162,7 +162,6 @@ impl SupervisorModel {
 
     fn lift_off(&self) -> Doing {
         match self.limits.on_lift_off {
-            OnLiftOff::Fault => Doing::Stopped(Fault::LiftOffTooLong),
             OnLiftOff::Recover if self.lift_offs > self.limits.recoveries => {
                 Doing::Stopped(Fault::RecoveryFailed)
             }
@@ -188,7 +187,7 @@ impl ReferenceStateMachine for SupervisorReference {
     type Transition = Event;
 
     fn init_state() -> BoxedStrategy<SupervisorModel> {
-        let reactions = [OnLiftOff::Recover, OnLiftOff::Continue, OnLiftOff::Fault];
+        let reactions = [OnLiftOff::Recover, OnLiftOff::Continue];
         let times = (0..12_u16, 0..40_u16, 0..20_u16, 0..20_u16);
         (times, select(reactions.to_vec()), 0..4_u32)
             .prop_map(|(times, on_lift_off, recoveries)| {

@@ -15,8 +15,6 @@ settings! {
         "recover" => Recover,
         /// Let the law continue, as in the paper, until the time limit.
         "continue" => Continue,
-        /// Latch the fault `LiftOffTooLong` at once.
-        "fault" => Fault,
     }
 }
 
@@ -100,6 +98,7 @@ impl Supervisor {
     #[inline]
     pub fn tick(&mut self, inputs: DigitalInputs, contact: bool, has_law: bool) -> Phase {
         let (mut arms, mut starts_tracking) = (false, false);
+        let recovers = self.settings.on_lift_off == OnLiftOff::Recover;
         let before = core::mem::replace(&mut self.inputs, inputs);
         let rises = |bit| inputs.contains(bit) && !before.contains(bit);
         let enabled = inputs.contains(DigitalInputs::ENABLE);
@@ -139,15 +138,11 @@ impl Supervisor {
                 }
                 if !contact {
                     self.lift_offs = self.lift_offs.saturating_add(1);
-                    let limit = self.settings.recoveries_limit;
-                    match self.settings.on_lift_off {
-                        OnLiftOff::Recover if self.lift_offs > limit => {
-                            self.latch(Fault::RecoveryFailed);
-                        }
-                        OnLiftOff::Recover | OnLiftOff::Continue => {
-                            self.enter(SupervisorState::LiftOff);
-                        }
-                        OnLiftOff::Fault => self.latch(Fault::LiftOffTooLong),
+                    let too_many = self.lift_offs > self.settings.recoveries_limit;
+                    if recovers && too_many {
+                        self.latch(Fault::RecoveryFailed);
+                    } else {
+                        self.enter(SupervisorState::LiftOff);
                     }
                 }
             }
@@ -164,7 +159,7 @@ impl Supervisor {
             state: self.state,
             arms,
             starts_tracking,
-            recovers: self.settings.on_lift_off == OnLiftOff::Recover,
+            recovers,
         }
     }
 
@@ -192,17 +187,6 @@ impl Supervisor {
     /// fault; the caller then takes the torque off.
     #[inline]
     pub fn note(&mut self, lapse: Lapse, times: u32) -> bool {
-        // Nearly all calls record no lapse: return early.
-        if times == 0 {
-            self.lapses.note(lapse, 0)
-        } else {
-            self.note_bad(lapse, times)
-        }
-    }
-
-    #[cold]
-    #[inline(never)]
-    fn note_bad(&mut self, lapse: Lapse, times: u32) -> bool {
         let latches = self.lapses.note(lapse, times) && self.fault.is_none();
         if latches {
             self.latch(lapse.fault());
