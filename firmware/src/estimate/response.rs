@@ -49,10 +49,8 @@ const END_TICKS: u8 = BLOCK_TICKS + 2;
 const PERIOD_TICKS: u8 = BLOCK_TICKS + 3;
 /// The law damps a contact if the upper bound of its response is below this part of [`RIGID`].
 const DAMPED: f32 = 0.4;
-/// Least 1 − p/Q22 in the stability limit: where p is greater, that limit does not matter.
-const LEAST_REST: f32 = 0.05;
-/// Time in contact before the correlation starts, s.
-const SETTLING_S: f32 = 0.05;
+/// Time in contact before the correlation starts: a contact that lasts longer is not a bounce, s.
+pub const SETTLING_S: f32 = 0.05;
 
 /// What the response allows.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -110,9 +108,8 @@ pub struct ResponseEstimator {
     blocks: f32,
     /// Sum of the squares of the blocks' weights in the averages.
     spread: f32,
-    /// Bounds of ρ from first differences.
-    lower: f32,
-    upper: f32,
+    /// Distance of the bounds of ρ from first differences.
+    width: f32,
     /// Fraction of the observers' full gain that the lower bound allows.
     gain: f32,
     /// How compliant the contact is, from the upper bound.
@@ -191,8 +188,7 @@ impl ResponseEstimator {
             averages: Default::default(),
             blocks: 0.0,
             spread: 1.0,
-            lower: 0.0,
-            upper: 1.0,
+            width: 1.0,
             gain: if settings.enabled { 0.0 } else { 1.0 },
             give: 0.0,
             lags: 0.0,
@@ -209,7 +205,12 @@ impl ResponseEstimator {
     #[inline]
     pub fn response(&self, p_per_kg: f32, p_ratio: f32) -> ContactResponse {
         let gain = self.gain.at_least(self.least_share_kg * p_per_kg);
-        let share = gain * p_ratio / (1.0 - p_ratio).at_least(LEAST_REST);
+        let rest = 1.0 - p_ratio;
+        let share = if gain < rest {
+            gain * p_ratio / rest
+        } else {
+            p_ratio
+        };
         ContactResponse {
             loop_share: EACH_LOOP * share.limited(0.0, p_ratio.at_least(0.0)),
             give: self.give,
@@ -246,10 +247,9 @@ impl ResponseEstimator {
         if self.touched_s < SETTLING_S {
             return false;
         }
-        if self.lower < RIGID {
+        if self.gain < 1.0 {
             // As much as there is to find out.
-            let width = (self.upper - self.lower).at_most(1.0);
-            self.draw_probe(width * self.settings.probe_n);
+            self.draw_probe(self.width.at_most(1.0) * self.settings.probe_n);
         }
         if self.block_ticks < BLOCK_TICKS {
             self.block_ticks += 1;
@@ -292,10 +292,10 @@ impl ResponseEstimator {
         self.block_ticks = 0;
         let [first, second] = &self.averages;
         let (response, deviation) = first.response(self.spread);
-        self.lower = response - DEVIATIONS * deviation;
-        self.upper = response + DEVIATIONS * deviation;
-        self.gain = self.lower / RIGID;
-        self.give = (1.0 - self.upper / (DAMPED * RIGID)).at_least(0.0);
+        self.width = 2.0 * DEVIATIONS * deviation;
+        self.gain = (response - DEVIATIONS * deviation) / RIGID;
+        let upper = response + DEVIATIONS * deviation;
+        self.give = (1.0 - upper / (DAMPED * RIGID)).at_least(0.0);
         let (response, deviation) = second.response(self.spread);
         let upper = response + DEVIATIONS * deviation;
         self.lags = (2.0 - 2.0 * upper / RIGID).limited(0.0, 1.0);
