@@ -18,8 +18,6 @@ settings! {
         integral_nm_rad_s: [f32; 2] = [25.0, 0.0], 0.0..=1e5, "N·m/(rad·s)";
         /// K_D of joint 1 and of joint 2.
         derivative_nms_rad: [f32; 2] = [2.0, 0.0], 0.0..=1e5, "N·m·s/rad";
-        /// Largest torque of the integral action.
-        integral_limit_nm: f32 = 5.0, 0.0..=1e3, "N·m";
     }
 }
 
@@ -49,10 +47,9 @@ impl Law for PidSettings {
         );
         let error = (theta_wanted - input.model.theta_rad).to_joints();
         let error_rate = (rate_wanted - input.model.theta_dot_rad_s).to_joints();
-        // Anti-windup: the integrals stop while the torque is limited, and never exceed their own
-        // limit.
+        // Anti-windup: the integrals stop while the torque is limited, and never exceed its limit.
         if !input.saturated {
-            let limit = self.integral_limit_nm;
+            let limit = input.torque_limit_nm;
             let step = error.torque_by(self.integral_nm_rad_s) * input.tick_s;
             state.integral_nm = (state.integral_nm + step).map(|torque| torque.within(limit));
         }

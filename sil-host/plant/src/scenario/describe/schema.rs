@@ -138,7 +138,7 @@ mod tests {
             assert_eq!(validate(&scenario.to_commented_toml()), Ok(()), "{name}");
         }
         assert_eq!(
-            validate("[controller.law.pid]\nintegral_limit_nm = 1.0"),
+            validate("[controller.law.pid]\nproportional_nm_rad = [1.0, 0.0]"),
             Ok(())
         );
         assert_eq!(validate("[arm_model]\nheight_m = 0.37"), Ok(()));
