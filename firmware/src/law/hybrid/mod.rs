@@ -111,12 +111,9 @@ impl Law for HybridSettings {
     /// belt may press with more than the torque can hold.
     fn reset(&self, state: &mut HybridState, input: &LawInput<'_>) {
         let force_n = input.contact.force_n.y.limited(0.0, self.normal_force_n);
-        // Limit to the friction cone: a saturated force cell gives any ratio.
-        let cone_n = input.contact.friction.coefficient * force_n;
         *state = HybridState {
             // Without a desired force there is no part of it.
             pressing: self.least_pressing.at_least(force_n / self.normal_force_n),
-            filtered_friction_n: input.contact.force_n.x.within(cone_n),
             slow_force_n: input.contact.force_n.y,
             fed_force_n: input.contact.force_n,
             ..HybridState::default()
