@@ -9,7 +9,9 @@
 use nalgebra::Vector2;
 use painleve_shared::{Arm, LinkMotion, Posture, Real, settings};
 
+use crate::estimate::belt::BOUND_ERROR_M_S;
 use crate::estimate::model::Model;
+use crate::estimate::response::SETTLING_S;
 use crate::law::LawOutput;
 use crate::refer::governor::USABLE_REACH;
 
@@ -17,8 +19,6 @@ use crate::refer::governor::USABLE_REACH;
 const CLEARANCE_M: f32 = 1e-3;
 /// Distance from the landing point within which the tip is lowered, m.
 const OVER_LANDING_PLACE_M: f32 = 2.0 * CLEARANCE_M;
-/// A contact that lasts this long is not a bounce, s.
-const LANDED_S: f32 = 0.05;
 /// Speed at which the tip is raised to its clearance, m/s.
 const RAISING_M_S: f32 = 0.1;
 /// Rate at which the height above the belt decays on the way down, as a part of the bandwidth of the motion.
@@ -30,8 +30,6 @@ const DEEPEST_M: f32 = 0.03;
 const SEARCHING: f32 = 4.0;
 /// Rate at which the landing point moves inwards while the path is out of reach, 1/s.
 const INWARDS_PER_S: f32 = 0.5;
-/// Speed along the belt below which the tip is at rest, m/s.
-const AT_REST_M_S: f32 = 0.01;
 /// Rate at which the path moves on while friction of the joints holds the tip short of its landing point, 1/s.
 const ONWARDS_PER_S: f32 = 5.0;
 /// Farthest path beyond the landing point, m.
@@ -78,7 +76,7 @@ impl Flight {
     pub fn touch(&mut self, tick_s: f32) -> bool {
         self.path_rad = None;
         self.touched_s += tick_s;
-        self.touched_s > LANDED_S
+        self.touched_s > SETTLING_S
     }
 }
 
@@ -107,7 +105,7 @@ impl RecoverySettings {
         flight.touched_s = 0.0;
         // Where the belt is higher than assumed, the tip rests on it on its way: it may land there, too.
         let waits = !flight.lands && flight.height_m == CLEARANCE_M;
-        let rests = waits && model.tip_velocity_m_s.x.abs() < AT_REST_M_S;
+        let rests = waits && model.tip_velocity_m_s.x.abs() < BOUND_ERROR_M_S;
         if rests {
             flight.landing_m = model.tip_m.x;
         }
@@ -226,7 +224,7 @@ mod tests {
             })
             .last()
             .unwrap();
-        let acceleration = model.free_acceleration_rad_s2(&torque);
+        let acceleration = model.acceleration_rad_s2(&torque, &Vector2::zeros());
         let down = -(model.jacobian * acceleration.vector()).y;
         (down, state.unwrap().landing_m)
     }
@@ -276,7 +274,8 @@ mod tests {
                 let friction_nm = JointTorque::from_array(friction_nm);
                 let model = model_of(theta, theta_dot, friction_nm);
                 let step_s = 1e-3 / STEPS as f32;
-                theta_dot += model.free_acceleration_rad_s2(&torque.torque_nm) * step_s;
+                theta_dot +=
+                    model.acceleration_rad_s2(&torque.torque_nm, &Vector2::zeros()) * step_s;
                 theta += theta_dot * step_s;
             }
             state
@@ -306,7 +305,7 @@ mod tests {
                 let torque = recovery.tick(&mut state, &arm, &model, Some(edges), 1e-3).torque_nm;
                 for _ in 0..10 {
                     let model = Model::new(&arm, theta, theta_dot, &GeneralisedTorque::zeros());
-                    theta_dot += model.free_acceleration_rad_s2(&torque) * 1e-4;
+                    theta_dot += model.acceleration_rad_s2(&torque, &Vector2::zeros()) * 1e-4;
                     theta += theta_dot * 1e-4;
                 }
                 let model = Model::new(&arm, theta, theta_dot, &GeneralisedTorque::zeros());

@@ -9,7 +9,7 @@ use painleve_shared::{Real, Slip, settings};
 
 use crate::estimate::friction::FrictionEstimate;
 
-/// Error of the tip velocities that are bounds of the belt's speed, m/s.
+/// Error of the tip's velocity, m/s: slower, it is at rest.
 pub const BOUND_ERROR_M_S: f32 = 0.01;
 
 settings! {
