@@ -30,7 +30,9 @@ pub struct LengthCalibrator {
     deviation_m: f32,
     /// Number of readings beyond which old ones are forgotten.
     most_readings: f32,
-    /// Mean of cos θ₁ + ρ cos θ₂.
+    /// What cos θ₁ + ρ cos θ₂ is on the belt with the nominal lengths, and the mean of what it is more: single precision
+    /// would lose small changes in a mean of the sum.
+    nominal_sum: f32,
     mean: f32,
     /// Number of readings in the mean.
     readings: f32,
@@ -44,6 +46,7 @@ impl LengthCalibrator {
             nominal: *nominal,
             deviation_m: settings.tolerance * nominal_m,
             most_readings: (AVERAGING_S / period_s).at_least(1.0),
+            nominal_sum: nominal.height_m() / nominal_m,
             mean: 0.0,
             readings: 0.0,
         }
@@ -68,10 +71,10 @@ impl LengthCalibrator {
         }
         let ([present_m, _], [nominal_m, _]) = (arm.link_length_m(), self.nominal.link_length_m());
         let height_m = arm.height_m();
-        let sum = (height_m - measured_gap_m) / present_m;
+        let excess = (height_m - measured_gap_m) / present_m - self.nominal_sum;
         self.readings = (self.readings + 1.0).at_most(self.most_readings);
-        self.mean += (sum - self.mean) / self.readings;
-        let length_m = height_m / self.mean;
+        self.mean += (excess - self.mean) / self.readings;
+        let length_m = height_m / (self.nominal_sum + self.mean);
         // Rejects non-finite lengths as well.
         if (length_m - nominal_m).abs() <= self.deviation_m {
             arm.scale_from(&self.nominal, length_m);
