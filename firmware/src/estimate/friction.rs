@@ -253,6 +253,7 @@ impl FrictionEstimator {
     /// estimated. It will land at rest, with the slip `at_rest` if that is known.
     pub fn leave(&mut self, estimate: &mut FrictionEstimate, at_rest: Option<Slip>) {
         self.contrary_ticks = 0;
+        estimate.sticks = false;
         estimate.variance = self.first_variance;
         estimate.slip = at_rest.unwrap_or(estimate.slip);
     }

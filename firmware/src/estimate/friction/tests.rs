@@ -125,6 +125,14 @@ fn ticks_before_a_flight_are_no_part_of_a_row_after_it() {
 }
 
 #[test]
+fn a_tip_that_has_left_the_belt_no_longer_sticks() {
+    let mut tested = Tested::new(0.6);
+    tested.estimate.sticks = true;
+    tested.estimator.leave(&mut tested.estimate, None);
+    assert!(!tested.estimate.sticks);
+}
+
+#[test]
 fn less_friction_is_learnt_at_once_unless_the_belt_drags_the_tip() {
     let mut tested = Tested::new(0.6);
     slide(&mut tested, 0.6, Slip::Positive, 2000);
