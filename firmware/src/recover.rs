@@ -224,7 +224,7 @@ mod tests {
             })
             .last()
             .unwrap();
-        let acceleration = model.acceleration_rad_s2(&torque, &Vector2::zeros());
+        let acceleration = model.free_acceleration_rad_s2(&torque);
         let down = -(model.jacobian * acceleration.vector()).y;
         (down, state.unwrap().landing_m)
     }
@@ -274,8 +274,7 @@ mod tests {
                 let friction_nm = JointTorque::from_array(friction_nm);
                 let model = model_of(theta, theta_dot, friction_nm);
                 let step_s = 1e-3 / STEPS as f32;
-                theta_dot +=
-                    model.acceleration_rad_s2(&torque.torque_nm, &Vector2::zeros()) * step_s;
+                theta_dot += model.free_acceleration_rad_s2(&torque.torque_nm) * step_s;
                 theta += theta_dot * step_s;
             }
             state
@@ -305,7 +304,7 @@ mod tests {
                 let torque = recovery.tick(&mut state, &arm, &model, Some(edges), 1e-3).torque_nm;
                 for _ in 0..10 {
                     let model = Model::new(&arm, theta, theta_dot, &GeneralisedTorque::zeros());
-                    theta_dot += model.acceleration_rad_s2(&torque, &Vector2::zeros()) * 1e-4;
+                    theta_dot += model.free_acceleration_rad_s2(&torque) * 1e-4;
                     theta += theta_dot * 1e-4;
                 }
                 let model = Model::new(&arm, theta, theta_dot, &GeneralisedTorque::zeros());

@@ -3,7 +3,6 @@
 use painleve_shared::frame::SensorFrame;
 
 use crate::estimate::Estimators;
-use crate::estimate::joints::MOST_LOST_TICKS;
 use crate::supervise::lapses::{BOARD_LAPSES, Lapse};
 use crate::supervise::supervisor::Supervisor;
 
@@ -93,7 +92,7 @@ fn irregular(
             state.unread_ticks = 0;
             Arrival::After(ticks)
         } else {
-            state.unread_ticks = ticks.min(MOST_LOST_TICKS);
+            state.unread_ticks = ticks.min(u32::MAX / 2);
             Arrival::OutOfRange
         }
     };

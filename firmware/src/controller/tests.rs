@@ -318,6 +318,66 @@ fn the_reference_waits_where_a_thrown_tip_has_left_it() {
     );
 }
 
+/// Returns a controller that tracked, with the drive off for 2 s in which somebody presses the tip and turns joint 1 on
+/// `counts_at`.
+fn turned_by_hand(counts_at: impl Fn(u32) -> i32) -> (Controller, SensorFrame) {
+    let mut controller = tracking();
+    let mut last = frame(20);
+    for tick in 20..2020 {
+        let mut by_hand = frame(tick);
+        by_hand.inputs = DigitalInputs::default();
+        let turned = by_hand.joints[0]
+            .0
+            .wrapping_add_signed(counts_at(tick - 20));
+        by_hand.joints[0].0 = turned % 16_384;
+        controller.tick(&by_hand);
+        last = by_hand;
+    }
+    (controller, last)
+}
+
+#[test]
+fn a_tip_that_somebody_presses_while_the_drive_is_off_shows_no_length() {
+    let before = tracking().stages.estimates.arm.link_length_m();
+    // Readings that change, away from the belt.
+    let (controller, _) = turned_by_hand(|tick| -200 - (tick as i32 % 3));
+    assert_eq!(controller.stages.estimates.arm.link_length_m(), before);
+}
+
+#[test]
+fn a_joint_turned_once_around_while_the_drive_is_off_is_where_it_was() {
+    let (mut controller, last) = turned_by_hand(|tick| 16_384.min(10 * tick as i32));
+    let theta = controller.stages.estimates.model.theta_rad.first();
+    assert!((theta - (-11.4_f32).to_radians()).abs() < 1e-3, "{theta}");
+    let enabled = SensorFrame {
+        tick: last.tick + 1,
+        sequence: last.sequence + 1,
+        ..frame(last.tick + 1)
+    };
+    assert_eq!(controller.tick(&enabled).latched_fault(), None);
+}
+
+#[test]
+fn torques_learnt_before_the_drive_was_off_are_forgotten() {
+    let mut controller = tracking();
+    // The arm does not give way to the torque of a law that wants to move: somebody holds it.
+    for tick in 20..520 {
+        controller.tick(&SensorFrame {
+            normal_force: ForceCounts(300),
+            ..frame(tick)
+        });
+    }
+    let learnt_nm = |controller: &Controller| controller.stages.estimates.disturbance.torque_nm;
+    assert!(learnt_nm(&controller).amax() > 0.1);
+    for tick in 520..523 {
+        controller.tick(&SensorFrame {
+            inputs: DigitalInputs::default(),
+            ..frame(tick)
+        });
+    }
+    assert_eq!(learnt_nm(&controller).amax(), 0.0);
+}
+
 #[test]
 fn bad_configurations_are_named() {
     let mut bad = configuration();

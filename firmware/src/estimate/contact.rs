@@ -64,13 +64,6 @@ pub struct EncoderReading {
     pub full_release: f32,
 }
 
-impl EncoderReading {
-    /// Whether the tip seems to be below the belt: the links are then shorter than configured.
-    pub fn is_below_belt(&self) -> bool {
-        self.gap_m < -self.gap_error_m
-    }
-}
-
 /// Weighs readings as evidence for contact or flight.
 #[derive(Clone, Copy, Debug)]
 pub struct ContactDetector {

@@ -113,9 +113,13 @@ impl DisturbanceEstimator {
         acted.ticks += ticks;
     }
 
-    /// Passes over a tick without information, because contact or a reading is in doubt.
+    /// Passes over a tick without information: contact or a reading is in doubt, or the drive is off. What a drive that was
+    /// on (`drove`) has learnt is forgotten once it is off: somebody may have held the arm.
     #[inline]
-    pub fn pause(&mut self) {
+    pub fn pause(&mut self, drove: bool) {
+        if !drove {
+            self.torque_nm = GeneralisedTorque::zeros();
+        }
         self.rate_rad_s = None;
         self.acted = Acted::default();
     }

@@ -17,8 +17,9 @@ impl Estimators {
         model.gap_m + jacobian.m21 * residual.first() + jacobian.m22 * residual.second()
     }
 
-    /// Returns the contact evidence from the encoders.
-    pub(super) fn encoder_reading(&self, last: &LastCommand) -> EncoderReading {
+    /// Returns the contact evidence from the encoders. The belt is assumed at the lowest tip position so far: initially the
+    /// start position, then every lower one.
+    pub(super) fn encoder_reading(&mut self, last: &LastCommand) -> EncoderReading {
         let model = &self.model;
         let count_rad = self.joints.rad_per_count;
         // Half a count of each encoder; the second encoder affects θ2 alone.
@@ -26,21 +27,18 @@ impl Estimators {
             0.5 * (model.tip_m.x.abs() * count_rad + model.jacobian.m22.abs() * count_rad);
         // Steady innovation after the contact force has vanished.
         let release = -self.joints.lag_counts(&last.contact_acceleration_rad_s2);
+        let mut gap_m = self.gap_m();
+        let gap_error_m = GAP_UNCERTAINTY_M + self.calibrator.gap_error_m(rounding_m);
+        if self.calibrator.is_open() || gap_m < -gap_error_m {
+            self.calibrator.restart(&mut self.arm, gap_m);
+            gap_m = 0.0;
+        }
         EncoderReading {
-            gap_m: self.gap_m(),
-            gap_error_m: GAP_UNCERTAINTY_M + self.calibrator.gap_error_m(rounding_m),
+            gap_m,
+            gap_error_m,
             moved: self.joints.moved,
             release: release.dot(&self.joints.innovation_counts()),
             full_release: release.norm_squared(),
-        }
-    }
-
-    /// With contact from the encoders, the belt is assumed at the lowest tip position so far: initially
-    /// the start position, then every lower one.
-    pub(super) fn find_belt(&mut self, encoders: &mut EncoderReading) {
-        if self.calibrator.is_open() || encoders.is_below_belt() {
-            self.calibrator.restart(&mut self.arm, encoders.gap_m);
-            encoders.gap_m = 0.0;
         }
     }
 }

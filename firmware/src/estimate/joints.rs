@@ -39,13 +39,10 @@ settings! {
     }
 }
 
-/// Largest number of ticks over which the joints are predicted: a fault is latched long before.
-pub const MOST_LOST_TICKS: u32 = 1000;
-
 /// Why the tracking loops have started from the readings of a tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Restart {
-    /// They are the first.
+    /// They are the first, or the first after so long that a joint may have made half a turn.
     FirstReadings,
     /// They differ from the previous ones by more than the joint can have moved.
     EncoderJump,
@@ -142,8 +139,13 @@ impl JointEstimator {
         if elapsed_ticks > self.predicted_ticks {
             self.bridge(acceleration_rad_s2, elapsed_ticks);
         }
-        let moved = [0, 1].map(|i| self.scales[i].difference(before[i], readings[i]));
         let most = self.jump_counts.saturating_mul(self.predicted_ticks);
+        if self.predicted_ticks > 1 && most >= self.scales[0].modulus() / 2 {
+            // The readings do not show in which direction a joint has turned.
+            self.start(readings);
+            return Err(Restart::FirstReadings);
+        }
+        let moved = [0, 1].map(|i| self.scales[i].difference(before[i], readings[i]));
         if moved.iter().any(|counts| counts.unsigned_abs() > most) {
             self.start(readings);
             return Err(Restart::EncoderJump);
@@ -169,17 +171,15 @@ impl JointEstimator {
     /// Predicts angles and rates at the next tick, given the expected acceleration of q' (rad/s²) until then.
     #[inline]
     pub fn predict(&mut self, acceleration_rad_s2: &JointMotion<f32>) {
-        let limit = self.settings.rate_limit_rad_s;
-        self.rates_rad_s = self.rates_rad_s.map(|rate| rate.within(limit));
         self.predict_over(acceleration_rad_s2, 1);
     }
 
     #[inline(always)]
     fn predict_over(&mut self, acceleration_rad_s2: &JointMotion<f32>, ticks: u32) {
-        let time_s = ticks as f32 * self.tick_s;
+        let (limit, time_s) = (self.settings.rate_limit_rad_s, ticks as f32 * self.tick_s);
         self.predicted_ticks = self.predicted_ticks.saturating_add(ticks);
-        let before = self.rates_rad_s;
-        self.rates_rad_s += *acceleration_rad_s2 * time_s;
+        let before = self.rates_rad_s.map(|rate| rate.within(limit));
+        self.rates_rad_s = before + *acceleration_rad_s2 * time_s;
         self.angles_rad += (before + self.rates_rad_s) * 0.5 * time_s;
     }
 
@@ -187,8 +187,21 @@ impl JointEstimator {
     // Out of line, because few ticks need it.
     #[inline(never)]
     fn bridge(&mut self, acceleration_rad_s2: &JointMotion<f32>, elapsed_ticks: u32) {
-        let ticks = (elapsed_ticks - self.predicted_ticks).min(MOST_LOST_TICKS);
-        self.predict_over(acceleration_rad_s2, ticks);
+        self.predict_over(acceleration_rad_s2, elapsed_ticks - self.predicted_ticks);
+    }
+
+    /// Leaves out the whole turns by which a joint of an arm without torque has been turned: targets are within half a turn
+    /// of zero.
+    // Out of line: a drive that is on does not need it.
+    #[inline(never)]
+    pub fn unwind(&mut self) {
+        let Some(readings) = self.readings else {
+            return;
+        };
+        let counts = [0, 1].map(|i| self.scales[i].counts_from_zero(readings[i]));
+        let turned = [0, 1].map(|i| counts[i].wrapping_sub(self.counts[i]) as f32);
+        self.angles_rad += JointMotion::from_array(turned) * self.rad_per_count;
+        self.counts = counts;
     }
 
     /// Corrects the next readings, which are expected near this pose.
@@ -335,6 +348,27 @@ mod tests {
             let followed = estimator.correct(&readings, 1, &still, &no_torque);
             assert_ne!(followed, Err(Restart::EncoderJump));
         }
+    }
+
+    #[test]
+    fn after_an_outage_in_which_a_joint_may_have_made_half_a_turn_the_loops_start_anew() {
+        let back = [SCALE.reading(0.3), SCALE.reading(0.1)];
+        let (still, no_torque) = (JointMotion::zeros(), JointTorque::zeros());
+        // 100 rad/s for 31 ms are less than half a turn.
+        for (lost_ticks, found) in [(30, Ok(())), (40, Err(Restart::FirstReadings))] {
+            let mut state = track(|t| (1.5 * t, 0.1), 0.0, 200);
+            for _ in 0..lost_ticks {
+                state.predict(&still);
+            }
+            assert_eq!(state.correct(&back, lost_ticks, &still, &no_torque), found);
+        }
+        let mut state = track(|t| (1.5 * t, 0.1), 0.0, 200);
+        for _ in 0..10_000_000 {
+            state.predict(&still);
+        }
+        let _ = state.correct(&back, 10_000_000, &still, &no_torque);
+        assert!((state.theta_rad().first() - 0.3).abs() < 1e-3);
+        assert_eq!(state.theta_dot_rad_s().first(), 0.0);
     }
 
     #[test]

@@ -130,8 +130,7 @@ impl Estimators {
         let touches = match self.detector.evidence() {
             Evidence::ForceCell => self.detector.update_from_force(force_n.y),
             Evidence::Encoders => {
-                let mut encoders = self.encoder_reading(last);
-                self.find_belt(&mut encoders);
+                let encoders = self.encoder_reading(last);
                 self.detector.update_from_encoders(&encoders)
             }
         };
@@ -208,7 +207,7 @@ impl Estimators {
                 self.balance_torques();
                 // The gap of a tip that certainly touches shows the links' length. An unchanged reading would gain weight
                 // merely with time.
-                if self.detector.is_certain() && self.joints.moved {
+                if observed.drove && self.detector.is_certain() && self.joints.moved {
                     let gap_m = self.gap_m();
                     self.calibrator.update(&mut self.arm, gap_m);
                 }
@@ -250,7 +249,7 @@ impl Estimators {
             self.disturbance
                 .add(torque_nm, force_n, observed.elapsed_ticks);
         } else {
-            self.disturbance.pause();
+            self.disturbance.pause(observed.drove);
         }
         is_informative
     }
@@ -268,6 +267,8 @@ impl Estimators {
                 .free_acceleration_rad_s2(&command.torque_nm)
                 .to_joints()
                 + command.contact_acceleration_rad_s2;
+        } else {
+            self.joints.unwind();
         }
         self.joints.predict(&command.expected_acceleration_rad_s2);
         self.evaluate();

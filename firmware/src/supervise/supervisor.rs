@@ -98,7 +98,6 @@ impl Supervisor {
     #[inline]
     pub fn tick(&mut self, inputs: DigitalInputs, contact: bool, has_law: bool) -> Phase {
         let (mut arms, mut starts_tracking) = (false, false);
-        let recovers = self.settings.on_lift_off == OnLiftOff::Recover;
         let before = core::mem::replace(&mut self.inputs, inputs);
         let rises = |bit| inputs.contains(bit) && !before.contains(bit);
         let enabled = inputs.contains(DigitalInputs::ENABLE);
@@ -139,7 +138,7 @@ impl Supervisor {
                 if !contact {
                     self.lift_offs = self.lift_offs.saturating_add(1);
                     let too_many = self.lift_offs > self.settings.recoveries_limit;
-                    if recovers && too_many {
+                    if self.recovers() && too_many {
                         self.latch(Fault::RecoveryFailed);
                     } else {
                         self.enter(SupervisorState::LiftOff);
@@ -159,8 +158,12 @@ impl Supervisor {
             state: self.state,
             arms,
             starts_tracking,
-            recovers,
+            recovers: self.recovers(),
         }
+    }
+
+    fn recovers(&self) -> bool {
+        self.settings.on_lift_off == OnLiftOff::Recover
     }
 
     /// Returns whether a count of ticks has exceeded `time_s`.
@@ -187,6 +190,17 @@ impl Supervisor {
     /// fault; the caller then takes the torque off.
     #[inline]
     pub fn note(&mut self, lapse: Lapse, times: u32) -> bool {
+        // Nearly all calls record no lapse: return early.
+        if times == 0 {
+            self.lapses.note(lapse, 0)
+        } else {
+            self.note_bad(lapse, times)
+        }
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn note_bad(&mut self, lapse: Lapse, times: u32) -> bool {
         let latches = self.lapses.note(lapse, times) && self.fault.is_none();
         if latches {
             self.latch(lapse.fault());
