@@ -68,6 +68,30 @@ fn the_edges_are_those_of_table_ii() {
     }
 }
 
+/// The calibration of the length shortens the reach, perhaps below points that the search has found.
+#[test]
+fn a_reach_that_shrinks_during_a_search_does_not_hold_it_up() {
+    let shorter = Arm::new(ArmParameters {
+        link_length_m: [0.2; 2],
+        ..ArmParameters::default()
+    })
+    .unwrap();
+    let friction = known(0.6, Slip::Positive);
+    for shortened_at in 0..60 {
+        let mut governor = governor();
+        for tick in 0..200 {
+            let arm = if tick < shortened_at { arm() } else { shorter };
+            governor.search(&arm, Posture::ElbowDown, -0.02, &friction, 0.0);
+        }
+        let (lower, upper) = governor.edges_m();
+        let reach_m = shorter.reach_on_belt_m();
+        assert!(
+            -reach_m < lower && upper < reach_m,
+            "{shortened_at}: {lower} {upper}"
+        );
+    }
+}
+
 /// Returns the distance, m, from the upper edge with the friction 0.6 to where p is zero, 0.16471 m.
 fn distance_m(configuration: &Configuration, landing: f32) -> f32 {
     let mut governor = with(configuration);
