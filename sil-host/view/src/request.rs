@@ -21,7 +21,7 @@ const MOST_WAITING: usize = 64;
 const MOST_PER_S: u32 = 100;
 const SECOND: Duration = Duration::from_secs(1);
 /// What a viewer is told that gives more.
-pub(crate) const TOO_MANY: &str = "more than 100 orders in a second: the others are refused";
+pub(crate) const TOO_MANY: &str = "more than 100 requests in a second: the others are refused";
 
 /// A viewer's request. In JSON `"pause"` or `{"step": {"ticks": 1}}`.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
@@ -119,7 +119,9 @@ impl Orders {
                 mem::replace(last, order).reply(Err("replaced by a later value".into()));
             }
             _ if count >= MOST_WAITING => {
-                return Err(format!("{count} orders wait for the run: try again later"));
+                return Err(format!(
+                    "{count} requests wait for the run: try again later"
+                ));
             }
             _ => waiting.push_back(order),
         }

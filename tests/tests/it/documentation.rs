@@ -95,12 +95,10 @@ fn the_commands_of_the_tutorials_succeed() {
         assert_eq!(code(output.status), 0, "{command}: {}", errors(&output));
         executed += 1;
     }
-    assert!(executed >= 11, "only {executed} commands found");
+    assert!(executed >= 10, "only {executed} commands found");
     for file in ["out/run.html", "out/my-arm.html", "out/commissioned.toml"] {
         assert!(bench.path(file).exists(), "{file}");
     }
-    let merged = fs::read_to_string(bench.path("out/sweep/merged.csv")).unwrap();
-    assert!(merged.lines().count() > 2, "{merged}");
 }
 
 #[test]

@@ -21,8 +21,8 @@ settings! {
         height_m: f64 = 0.0, 0.0..=20.0, "m";
         /// Standard deviation of the tip's position along the belt, if link 1 has its stated length.
         tip_m: f64 = 0.0, 0.0..=1.0, "m";
-        /// Part of `controller.estimator.tip_deviation_m` that was told, for play of the gears, say. Once the arm is commissioned or
-        /// identified, set this key: commands compute the other.
+        /// Part of `controller.estimator.tip_deviation_m` that you set, such as for play of the gears. Once the arm is
+        /// commissioned or identified, change this key only: commands compute the other.
         told_m: f64 = 0.0, 0.0..=0.1, "m";
         /// Distance of the tip from a straight line in the slides, root mean square.
         off_line_m: f64 = 0.0, 0.0..=1.0, "m";

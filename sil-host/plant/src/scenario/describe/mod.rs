@@ -66,13 +66,9 @@ fn resolved(field: &Field) -> Field {
 
 /// Returns the allowed values of a setting in words; empty if its type says everything.
 fn allowed(field: &Field) -> String {
-    let mut text = match (field.range, choice(&field.shape)) {
-        (Some(range), _) => interval(&range),
-        (None, Some(names)) => names,
-        (None, None) => match field.shape {
-            Shape::Switch => "true or false".into(),
-            _ => String::new(),
-        },
+    let mut text = match field.range {
+        Some(range) => interval(&range),
+        None => names(&field.shape).unwrap_or_default(),
     };
     match field.shape {
         Shape::Array { .. } => text = format!("each {text}"),
@@ -103,17 +99,16 @@ fn bound(value: f64) -> String {
     }
 }
 
-/// Returns the names of a choice's variants.
-fn choice(shape: &Shape) -> Option<String> {
+/// Returns the names of a choice's variants, or of a switch's positions.
+fn names(shape: &Shape) -> Option<String> {
     match shape {
+        Shape::Switch => Some("true or false".into()),
         Shape::Choice { variants, .. } => {
             let names: Vec<_> = variants.iter().map(|it| it.key).collect();
             let (last, others) = names.split_last()?;
             Some(format!("{} or {last}", others.join(", ")))
         }
-        Shape::Optional(item) | Shape::Array { item, .. } | Shape::List { item, .. } => {
-            choice(item)
-        }
+        Shape::Optional(item) | Shape::Array { item, .. } | Shape::List { item, .. } => names(item),
         _ => None,
     }
 }
