@@ -331,8 +331,8 @@ fn temporaries(place: &OutputPlace) -> Vec<OsString> {
     let is_temporary = |name: &[u8]| {
         name.strip_prefix(prefix.as_bytes())
             .and_then(|rest| rest.strip_suffix(SUFFIX.as_bytes()))
-            // Otherwise it belongs to a longer name.
-            .is_some_and(|random| !random.contains(&b'.'))
+            // Otherwise it belongs to a longer name, or is a file of the user.
+            .is_some_and(|random| random.len() == 16 && random.iter().all(u8::is_ascii_hexdigit))
     };
     let flags = OFlag::O_RDONLY | OFlag::O_DIRECTORY | OFlag::O_CLOEXEC;
     let Ok(mut folder) = Dir::openat(&place.folder, ".", flags, Mode::empty()) else {
@@ -426,13 +426,19 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("run.svg");
         let writing = AtomicFile::create(&path).unwrap();
-        fs::write(folder.path().join(".run.svg.killed.part"), "half").unwrap();
-        fs::write(folder.path().join(".other.svg.killed.part"), "half").unwrap();
+        let kept = [
+            ".other.svg.0123456789abcdef.part",
+            ".run.svg.first.part",
+            ".run.svg.second-of-two-oh.part",
+        ];
+        for name in [".run.svg.0123456789abcdef.part"].iter().chain(&kept) {
+            fs::write(folder.path().join(name), "half").unwrap();
+        }
         write(&path, b"next").unwrap();
         writing.commit().unwrap();
         let mut left = names(folder.path());
         left.sort();
-        assert_eq!(left, [".other.svg.killed.part", "run.svg"]);
+        assert_eq!(left, [&kept[..], &["run.svg"]].concat());
     }
 
     #[test]
