@@ -195,7 +195,7 @@ impl AtomicFile {
     ///
     /// # Errors
     /// [`AtomicFileError::Write`] if the disk is full or the name is not available; the file is
-    /// then removed.
+    /// then removed. If nothing fails but the sync of its folder, it has its name already.
     pub fn commit(self) -> Result<(), AtomicFileError> {
         self.sync()?;
         let OutputPlace { folder, name, .. } = &self.place;
@@ -349,7 +349,7 @@ fn temporaries(place: &OutputPlace) -> Vec<OsString> {
 /// them.
 ///
 /// # Errors
-/// As [`AtomicFile::commit`].
+/// As [`AtomicFile::commit`]; files that already have their names keep them.
 pub fn commit_all(files: Vec<AtomicFile>) -> Result<(), AtomicFileError> {
     files.iter().try_for_each(AtomicFile::sync)?;
     files.into_iter().try_for_each(AtomicFile::commit)
@@ -429,7 +429,7 @@ mod tests {
         let kept = [
             ".other.svg.0123456789abcdef.part",
             ".run.svg.first.part",
-            ".run.svg.second-of-two-oh.part",
+            ".run.svg.sixteen-letters!.part",
         ];
         for name in [".run.svg.0123456789abcdef.part"].iter().chain(&kept) {
             fs::write(folder.path().join(name), "half").unwrap();
@@ -499,7 +499,6 @@ mod tests {
         assert_eq!(names(folder.path()).len(), 2);
     }
 
-    /// A shared folder in which everybody may put links, as in `/tmp`.
     #[test]
     fn a_path_that_ends_like_a_folder_is_none_of_a_file() {
         let folder = tempfile::tempdir().unwrap();
@@ -547,6 +546,7 @@ mod tests {
         fs::set_permissions(&drop_box, fs::Permissions::from_mode(0o700)).unwrap();
     }
 
+    /// A shared folder in which everybody may put links, as in `/tmp`.
     #[test]
     fn links_of_other_users_are_refused_where_they_choose_the_file() {
         const STRANGER: u32 = 23_002;
