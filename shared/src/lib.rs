@@ -6,6 +6,8 @@
 //! - [`coordinates`]: link and joint coordinates as distinct types
 //! - [`counts`]: integer readings and commands of the converters, with their scaling
 //! - [`frame`], [`status`]: the data that crosses the link at every control tick
+//! - [`mounting`], [`stages`], [`winding`]: settings of a real arm's sensors, motors and gears, and windings
+//! - [`black_box`], [`stored`]: what a board keeps over a reset, and over a loss of power
 //! - [`lapse`]: counted errors of ticks, frames and messages, with limits
 //! - [`wire`], [`message`]: frames, requests and responses as bytes, for links other than shared
 //!   memory
