@@ -10,7 +10,7 @@ use painleve_record::messages::{
     CHANNELS, EVENTS, SCENE, TRANSFORMS, TickMessage, channels, event_message, nanoseconds,
 };
 use serde::{Deserialize, Serialize};
-use serde_json::{Map, Value, json};
+use serde_json::{Value, json};
 use tungstenite::{Error, Message, WebSocket};
 
 use super::services;
@@ -26,9 +26,9 @@ const TIME: u8 = 2;
 const SERVICE_CALL_RESPONSE: u8 = 3;
 const SERVICE_CALL_REQUEST: u8 = 2;
 
-/// A client's message in JSON, whose name is its field `op`.
+/// A client's message in JSON.
 #[derive(Debug, Deserialize)]
-#[serde(rename_all = "camelCase", rename_all_fields = "camelCase")]
+#[serde(tag = "op", rename_all = "camelCase", rename_all_fields = "camelCase")]
 enum Request {
     Subscribe {
         subscriptions: Vec<Subscription>,
@@ -50,17 +50,6 @@ enum Request {
     UnsubscribeParameterUpdates {
         parameter_names: Vec<String>,
     },
-}
-
-impl Request {
-    /// Reads a message. The name is first moved outside: why, [`ViewerRequest`](crate::request::ViewerRequest)
-    /// explains.
-    fn read(text: &str) -> serde_json::Result<Self> {
-        let mut fields: Map<String, Value> = serde_json::from_str(text)?;
-        let name = fields.remove("op").unwrap_or_default();
-        let name = name.as_str().unwrap_or_default();
-        serde_json::from_value(json!({ name: fields }))
-    }
 }
 
 #[derive(Debug, Deserialize)]
@@ -136,7 +125,7 @@ impl Client<'_> {
     /// Takes a request and sends what waits.
     fn exchange(&mut self) -> Result<(), Error> {
         match receive(&mut self.socket)? {
-            Some(Message::Text(text)) => match Request::read(&text) {
+            Some(Message::Text(text)) => match serde_json::from_str(&text) {
                 Ok(request) => self.obey(request)?,
                 Err(error) => self.write(&status(Severity::Error, &error.to_string()))?,
             },
