@@ -9,12 +9,11 @@ mod verdict;
 
 use std::io::Write;
 use std::ops::Range;
-use std::path::PathBuf;
 
 use painleve_chart::Chart;
 use painleve_chart::decimate::{Bin, Decimator};
 use painleve_chart::picture;
-use painleve_files::atomic_file::{self, AtomicFile, AtomicFileError};
+use painleve_files::atomic_file::AtomicFile;
 use painleve_plant::scenario::Scenario;
 use painleve_plant::{ContactMode, Event};
 use painleve_shared::frame::StatusFlags;
@@ -191,14 +190,6 @@ impl RunPlot {
             ..Chart::default()
         }
         .svg()
-    }
-
-    /// Writes the figure to an SVG file, either completely or not at all.
-    ///
-    /// # Errors
-    /// [`AtomicFileError`] if the file cannot be written.
-    pub fn write(&self, path: impl Into<PathBuf>) -> Result<(), AtomicFileError> {
-        atomic_file::write(path, self.svg().as_bytes())
     }
 }
 

@@ -186,17 +186,6 @@ fn runs_with_few_or_no_samples_are_drawn() {
     assert!(texts(&svg).contains(&"Simulated time (s): no samples"));
 }
 
-#[test]
-fn a_figure_is_written_completely_and_an_unwritable_path_is_named() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("out/run.svg");
-    let plot = plot(10);
-    plot.write(&path).unwrap();
-    assert_eq!(std::fs::read_to_string(&path).unwrap(), plot.svg());
-    let error = plot.write(path.join("run.svg")).unwrap_err().to_string();
-    assert!(error.contains("run.svg/run.svg"), "{error}");
-}
-
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
     #[test]
