@@ -70,6 +70,11 @@ try {
   check(await browser.evaluate("document.documentElement.dataset.theme") === "dark", "the theme changes");
   await browser.click("#events li:last-child button");
   check(Math.abs(await time() - await browser.evaluate("page.events.at(-1)[0]")) < 1e-3, "an event is a place to go to");
+  const opened = () => browser.evaluate("document.querySelector('#events').open");
+  const before = await opened();
+  await browser.evaluate("document.querySelector('#events summary').focus()");
+  await browser.key(" ");
+  check(await opened() !== before && !await browser.evaluate("page.playing"), "the space bar opens and closes a part in focus");
 
   await browser.resize(400, 800);
   await pause(300);

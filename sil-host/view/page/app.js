@@ -120,7 +120,8 @@ class Page {
     $("speed").addEventListener("change", () => this.speedChanged?.(Number($("speed").value)));
     if (!this.live) for (const only of document.querySelectorAll("[data-live]")) only.remove();
     document.addEventListener("keydown", (event) => {
-      if (event.target.matches("input:not([type=range]), select, textarea") || event.ctrlKey || event.metaKey || event.altKey) return;
+      const taken = `input:not([type=range]), select, textarea${event.key === " " ? ", summary" : ""}`;
+      if (event.target.matches(taken) || event.ctrlKey || event.metaKey || event.altKey) return;
       const far = event.shiftKey ? 0.1 : 0;
       const act = {
         " ": () => this.toggle(), ArrowLeft: () => (far ? this.seek(this.time - far) : this.step(-1)),
