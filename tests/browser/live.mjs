@@ -60,6 +60,8 @@ try {
   check(!await browser.evaluate("document.querySelector('#subtitle').textContent.includes('seed 77')"), "the header waits for the reset");
   await browser.set(field("any"), "controller.law = { pid = {} }");
   await browser.until("document.querySelector('#subtitle').textContent.includes('Law pid')", "the header shows the present law");
+  const offers = (key) => `document.querySelector(${JSON.stringify(field(key))})`;
+  await browser.until(`!${offers("controller.law.hybrid.normal_force_n")} && ${offers("belt.friction")}.value === "1.2"`, "settings of the law before are not offered");
   const saved = (id) => browser.evaluate(`decodeURIComponent(document.querySelector("#${id}").href)`);
   const settings = await saved("save");
   for (const part of ["friction = 1.2", "seed = 77", "[controller.law.pid]"]) check(settings.includes(part), `${part} is saved`);

@@ -9,7 +9,8 @@ const PUSHES = [["push ←", [-5, 0]], ["push →", [5, 0]], ["push ↑", [0, 15
 
 function connect(page) {
   const form = $("parameters"), status = $("status");
-  let socket, fresh = false, listed = 0, turn = 0, outdated = 0;
+  const any = document.createElement("label");
+  let socket, fresh = false, listed = 0, turn = 0, outdated = 0, offered;
   const send = (order) => { if (socket.readyState === WebSocket.OPEN) socket.send(JSON.stringify(order)); };
 
   for (const only of document.querySelectorAll("[data-live]")) only.hidden = false;
@@ -49,6 +50,7 @@ function connect(page) {
     if ("error" in message) show(message.error, "error");
     if (message.status) {
       const { paused, factor, ticks_per_s, real_time_factor, settings, totals } = message.status;
+      offer(settings);
       for (const { key, value } of settings) {
         const input = form.elements[key];
         if (input && input !== document.activeElement) input.value = value ?? "";
@@ -114,16 +116,24 @@ function connect(page) {
     if (page.events.length !== listed) { page.listEvents(listed); listed = page.events.length; page.verdict(); }
   };
 
-  for (const { key, label, value, minimum, maximum, step, template } of page.run.parameters) {
-    const name = document.createElement("label"), input = document.createElement("input");
-    Object.assign(input, { type: "number", name: key, value, min: minimum, max: maximum, step });
-    input.addEventListener("change", () => {
-      if (input.value !== "") send({ set: { key, value: (template ?? "%").replace("%", Number(input.value).toFixed(9)) } });
-    });
-    name.append(label, input);
-    form.append(name);
+  /** Makes a field of each setting before the one for any key; each law has its own settings. */
+  function offer(settings) {
+    const keys = settings.map(({ key }) => key).join();
+    if (keys === offered) return;
+    offered = keys;
+    while (form.firstChild !== any) form.firstChild.remove();
+    for (const { key, label, minimum, maximum, step, template } of settings) {
+      const name = document.createElement("label"), input = document.createElement("input");
+      Object.assign(input, { type: "number", name: key, min: minimum, max: maximum, step });
+      input.addEventListener("change", () => {
+        if (input.value !== "") send({ set: { key, value: (template ?? "%").replace("%", Number(input.value).toFixed(9)) } });
+      });
+      name.append(label, input);
+      any.before(name);
+    }
   }
-  const any = document.createElement("label"), line = document.createElement("input");
+
+  const line = document.createElement("input");
   Object.assign(line, { type: "text", name: "any", placeholder: "run.seed = 2" });
   line.addEventListener("change", () => {
     const [key, ...value] = line.value.split("=");

@@ -45,9 +45,8 @@ pub fn run(
     origins: &[String],
     interrupt: &Interrupt,
 ) -> Result<(), CommandError> {
-    let mut page = description(scenario);
-    page["parameters"] = page_settings::settings(scenario);
-    let server = Server::start(port, html(&page), token, origins)
+    let page = html(&description(scenario));
+    let server = Server::start(port, page, token, origins)
         .map_err(|source| InputError::Port { port, source })?;
     let mut live = Live::new(scenario.clone(), command, server.hub.clone())?;
     warn(format_args!(
