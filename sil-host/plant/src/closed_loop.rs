@@ -60,6 +60,9 @@ pub trait Monitor {
     /// [`LoopError`] ends the run.
     fn sample(&mut self, sample: &Sample) -> Result<(), LoopError>;
 
+    /// Receives the controller's last answer at every tick, before the tick's sample; costs far less than a sample.
+    fn answer(&mut self, _time_s: f64, _answer: &ActuatorFrame) {}
+
     /// Receives every discontinuity of the plant's motion, in order of time.
     fn event(&mut self, _time_s: f64, _event: Event) {}
 
@@ -293,6 +296,7 @@ impl<H: ControllerHost, P: Plant> ClosedLoop<H, P> {
         // A late answer that reports a fault takes effect, but does not answer this tick.
         let answered = frame.is_some_and(|answer| answer.tick == sensor.tick);
         self.stale_ticks += u64::from(!answered);
+        monitor.answer(self.simulation.plant().time_s(), &self.last_answer);
         if monitor.wants_samples() {
             monitor.sample(&Sample {
                 answered,

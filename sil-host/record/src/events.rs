@@ -1,7 +1,7 @@
 //! Events of a run: discontinuities of the plant's motion and changes of the controller's state.
 
-use painleve_plant::sample::Sample;
 use painleve_plant::{ContactMode, Event};
+use painleve_shared::ActuatorFrame;
 use painleve_shared::frame::StatusFlags;
 use painleve_shared::status::{Fault, SupervisorState};
 
@@ -120,9 +120,8 @@ pub struct ControllerEvents {
 }
 
 impl ControllerEvents {
-    /// Returns the changes since the last sample.
-    pub fn take_in(&mut self, sample: &Sample) -> [Option<EventKind>; 4] {
-        let answer = &sample.actuator;
+    /// Returns the changes since the last answer.
+    pub fn take_in(&mut self, answer: &ActuatorFrame) -> [Option<EventKind>; 4] {
         let before = self.clone();
         self.state = answer.supervisor_state().unwrap_or(before.state);
         self.fault = answer.latched_fault();

@@ -297,7 +297,7 @@ impl Recording {
                 kind: EventKind::EstimatesEnd,
             })?;
         }
-        for kind in self.events.take_in(sample).into_iter().flatten() {
+        for kind in self.events.take_in(&sample.actuator).into_iter().flatten() {
             self.event(&RunEvent {
                 time_s: sample.plant.time_s,
                 kind,

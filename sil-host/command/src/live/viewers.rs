@@ -12,6 +12,7 @@ use painleve_plant::scenario::Scenario;
 use painleve_plant::{Controller, Event};
 use painleve_record::RecordedTick;
 use painleve_record::events::{ControllerEvents, EventKind, RunEvent};
+use painleve_shared::ActuatorFrame;
 use painleve_shared::frame::SensorFrame;
 use painleve_view::events::{Totals, entry};
 use painleve_view::foxglove::feed::Feed;
@@ -128,11 +129,13 @@ impl Monitor for Viewers {
         if self.hub.has_subscribers() {
             self.feed.tick(&tick);
         }
-        let time_s = sample.plant.time_s;
-        for kind in self.events.take_in(sample).into_iter().flatten() {
+        Ok(())
+    }
+
+    fn answer(&mut self, time_s: f64, answer: &ActuatorFrame) {
+        for kind in self.events.take_in(answer).into_iter().flatten() {
             self.show(&RunEvent { time_s, kind });
         }
-        Ok(())
     }
 
     fn event(&mut self, time_s: f64, event: Event) {
@@ -144,8 +147,27 @@ impl Monitor for Viewers {
 #[cfg(test)]
 mod tests {
     use painleve_plant::ContactMode;
+    use painleve_plant::closed_loop::ClosedLoop;
+    use painleve_plant::simulation::Simulation;
 
     use super::*;
+
+    #[test]
+    fn events_on_ticks_that_are_not_shown_have_the_same_times() {
+        let scenario = Scenario::load("pid-elbow-up", &[]).unwrap();
+        let configuration = scenario.controller_configuration();
+        // Every tick is shown, or none.
+        let [shown, hidden] = [true, false].map(|is_watched| {
+            let mut viewers = Viewers::new(&scenario, Arc::default());
+            viewers.watch(is_watched);
+            let host = viewers.host(Controller::new(&configuration).unwrap());
+            let mut closed_loop = ClosedLoop::new(Simulation::new(&scenario).unwrap(), host);
+            (0..scenario.run.ticks()).for_each(|_| closed_loop.tick(&mut viewers).unwrap());
+            json!(viewers.totals)
+        });
+        assert!(shown["state"].is_array() && shown["fault"].is_array());
+        assert_eq!(hidden, shown);
+    }
 
     #[test]
     fn lift_offs_that_are_not_listed_are_counted() {
