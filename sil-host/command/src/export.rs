@@ -10,7 +10,7 @@ use painleve_process::interrupt::Interrupt;
 use painleve_process::terminal::warn;
 use painleve_record::export::{ExportError, Exported, ticks_to_csv};
 use painleve_record::record_file;
-use painleve_record::ros2::{self, BagError};
+use painleve_record::ros2;
 use serde_json::json;
 
 use super::output_error::{InputError, RecordFileError, output};
@@ -154,27 +154,12 @@ fn export(
 ) -> Result<Exported, CommandError> {
     let record = record_error(arguments, input_file::open(&arguments.record))?;
     let table = Interruptible { file, interrupt };
-    match ticks_to_csv(BufReader::with_capacity(1 << 20, record), table) {
-        Err(ExportError::Write(source)) => Err(output(AtomicFileError::Write {
-            path: path.to_path_buf(),
-            source: source.into(),
-        })),
-        exported => {
-            let mut exported = record_error(arguments, exported)?;
-            match exported.damage.take() {
-                Some(damage) if !arguments.recover => {
-                    let damaged = RecordFileError::Damaged {
-                        reason: damage.to_string(),
-                        whole_bytes: exported.whole_bytes,
-                        rows: exported.rows,
-                        end_s: exported.end_s,
-                    };
-                    record_error(arguments, Err(damaged))
-                }
-                damage => Ok(Exported { damage, ..exported }),
-            }
-        }
-    }
+    let exported = ticks_to_csv(BufReader::with_capacity(1 << 20, record), table);
+    let wanted = match exported {
+        Ok(exported) if !arguments.recover => exported.whole(),
+        exported => exported,
+    };
+    written(arguments, path, wanted)
 }
 
 /// Writes the bag, and returns it with the number of its ticks.
@@ -184,7 +169,8 @@ fn export_bag(
     interrupt: &Interrupt,
 ) -> Result<(AtomicFile, u64), CommandError> {
     let open = || record_error(arguments, input_file::open(&arguments.record)).map(BufReader::new);
-    let notes = record_error(arguments, record_file::notes(open()?))?.unwrap_or_default();
+    let notes = record_file::notes(open()?).map_err(ExportError::from);
+    let notes = record_error(arguments, notes)?.unwrap_or_default();
     // Records of earlier versions do not tell when they began.
     let start_ns = notes
         .get("start_unix_ns")
@@ -193,12 +179,22 @@ fn export_bag(
         file: AtomicFile::create(path).map_err(output)?,
         interrupt,
     };
-    match ros2::to_bag(open()?, start_ns.unwrap_or_default(), file) {
-        Err(BagError::Write(source)) => Err(output(AtomicFileError::Write {
+    let bag = ros2::to_bag(open()?, start_ns.unwrap_or_default(), file);
+    written(arguments, path, bag).map(|(bag, ticks)| (bag.file, ticks))
+}
+
+/// Adds the name of the file that was to be written, or of the record, to an error.
+fn written<T>(
+    arguments: &ExportArguments,
+    path: &Path,
+    exported: Result<T, ExportError>,
+) -> Result<T, CommandError> {
+    match exported {
+        Err(ExportError::Write(source)) => Err(output(AtomicFileError::Write {
             path: path.to_path_buf(),
-            source,
+            source: source.into(),
         })),
-        bag => record_error(arguments, bag).map(|(bag, ticks)| (bag.file, ticks)),
+        exported => record_error(arguments, exported),
     }
 }
 

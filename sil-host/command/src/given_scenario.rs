@@ -5,6 +5,7 @@ use std::path::Path;
 
 use painleve_files::input_file;
 use painleve_plant::scenario::Scenario;
+use painleve_record::export::ExportError;
 use painleve_record::record_file;
 
 use super::CommandError;
@@ -39,7 +40,7 @@ pub fn load(name: &str) -> Result<Scenario, CommandError> {
 pub fn of_record(path: &Path) -> Result<Scenario, CommandError> {
     let file = input_file::open(path).map_err(|error| InputError::record(path, error))?;
     let notes = record_file::notes(BufReader::new(file))
-        .map_err(|damage| InputError::record(path, damage))?;
+        .map_err(|damage| InputError::record(path, ExportError::from(damage)))?;
     let settings = notes.and_then(|mut notes| notes.remove("configuration"));
     let settings = settings.ok_or_else(|| InputError::record(path, RecordFileError::NoSettings))?;
     Ok(Scenario::of_record(path, &settings)?)

@@ -8,9 +8,7 @@ use painleve_commission::simulated::SimulatedError;
 use painleve_files::atomic_file::AtomicFileError;
 use painleve_record::comparison::NoEvent;
 use painleve_record::export::ExportError;
-use painleve_record::record_file::Damage;
 use painleve_record::recorder::RecordError;
-use painleve_record::ros2::BagError;
 use painleve_record::run_table::TableError;
 
 use super::CommandError;
@@ -61,32 +59,12 @@ pub enum RecordFileError {
     /// Its content cannot be used.
     #[error(transparent)]
     Content(#[from] ExportError),
-    /// It is damaged before its settings.
-    #[error("not a complete MCAP file: {0}")]
-    Damage(#[from] Damage),
-    /// No bag can be made of it.
-    #[error(transparent)]
-    Bag(#[from] BagError),
     /// It has no settings.
     #[error("it has no settings of a run: this is not a record of painleve")]
     NoSettings,
     /// It is no table of ticks.
     #[error(transparent)]
     Table(#[from] TableError),
-    /// It is damaged, but not at its beginning.
-    #[error(
-        "it is damaged after {whole_bytes} bytes: {reason}; --recover exports the {rows} ticks before, up to {end_s} s"
-    )]
-    Damaged {
-        /// What is wrong.
-        reason: String,
-        /// Bytes before the damage.
-        whole_bytes: u64,
-        /// Whole ticks.
-        rows: u64,
-        /// Time of the last of them, s.
-        end_s: f64,
-    },
 }
 
 /// A file or option cannot be used.

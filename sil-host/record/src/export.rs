@@ -14,13 +14,31 @@ use crate::record_file::{Damage, Extent, RecordedMessage, messages};
 /// Why a record cannot be exported.
 #[derive(Debug, thiserror::Error)]
 pub enum ExportError {
-    /// No whole tick can be read.
+    /// The record is damaged, and nothing is exported.
     #[error("not a complete MCAP file: {0}")]
-    Nothing(Damage),
+    Incomplete(#[from] Damage),
+    /// The record is damaged behind whole ticks.
+    #[error(
+        "it is damaged after {whole_bytes} bytes: {reason}; `painleve export --csv --recover` exports the {rows} ticks \
+         before, up to {end_s} s"
+    )]
+    Damaged {
+        /// What is wrong.
+        reason: Damage,
+        /// Bytes before the damage.
+        whole_bytes: u64,
+        /// Whole ticks.
+        rows: u64,
+        /// Time of the last of them, s.
+        end_s: f64,
+    },
     /// The file has no topic with one message per tick.
     #[error("no topic /plant, /sensor, /actuator or /estimates: this is not a record of painleve")]
     NoTicks,
-    /// The rows cannot be written.
+    /// A time is later than a bag can hold.
+    #[error("a time by the clock is later than January 2038, the end of the times of ROS 2")]
+    Late,
+    /// What is exported cannot be written.
     #[error(transparent)]
     Write(#[from] csv::Error),
 }
@@ -36,6 +54,29 @@ pub struct Exported {
     pub damage: Option<Damage>,
     /// Bytes of the record before the damage.
     pub whole_bytes: u64,
+}
+
+impl Exported {
+    /// Refuses what is not the whole record.
+    ///
+    /// # Errors
+    /// [`ExportError::Damaged`].
+    pub fn whole(self) -> Result<Self, ExportError> {
+        match self {
+            Self {
+                damage: Some(reason),
+                whole_bytes,
+                rows,
+                end_s,
+            } => Err(ExportError::Damaged {
+                reason,
+                whole_bytes,
+                rows,
+                end_s,
+            }),
+            whole => Ok(whole),
+        }
+    }
 }
 
 /// Writes the ticks of a record as CSV, with the columns of [`csv_table`](crate::csv_table). Of a damaged record the
@@ -63,7 +104,7 @@ pub fn ticks_to_csv(record: impl Read, output: impl Write) -> Result<Exported, E
         rows.end_row()?;
     }
     if rows.written == 0 {
-        return Err(damage.map_or(ExportError::NoTicks, ExportError::Nothing));
+        return Err(damage.map_or(ExportError::NoTicks, ExportError::Incomplete));
     }
     rows.writer.flush().map_err(csv::Error::from)?;
     Ok(Exported {

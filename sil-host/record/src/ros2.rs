@@ -8,12 +8,13 @@
 //! A bag's times are those of the clock. ROS 2 needs no package of ours to read it: the definitions are in the file.
 
 use std::collections::BTreeMap;
-use std::io::{self, Read, Seek, Write};
+use std::io::{Read, Seek, Write};
 
 use mcap::McapError;
 use mcap::records::MessageHeader;
 use serde_json::{Map, Value};
 
+use crate::export::ExportError;
 use crate::fields::{ESTIMATES, PLANT, Read as Kind, SENSOR, TOPICS, Topic};
 use crate::mcap_log::reason;
 use crate::record_file::{Damage, Extent, RecordedMessage, messages};
@@ -34,36 +35,22 @@ const JOINTS: [&str; 2] = ["shoulder", "elbow"];
 /// Frame of the force.
 const FRAME: &str = "belt";
 
-/// Why a bag cannot be written.
-#[derive(Debug, thiserror::Error)]
-pub enum BagError {
-    /// The record is damaged.
-    #[error(transparent)]
-    Damage(#[from] Damage),
-    /// The record has no ticks.
-    #[error("no topic /plant, /sensor, /actuator or /estimates: this is not a record of painleve")]
-    NoTicks,
-    /// The bag cannot be written.
-    #[error(transparent)]
-    Write(#[from] io::Error),
-}
-
 /// Writes the messages of a record as a bag and returns it with the number of ticks. `start_ns` is the time by the clock at
 /// the start, ns since 1970.
 ///
 /// # Errors
-/// [`BagError`] if the record is damaged or empty, or the bag cannot be written.
+/// [`ExportError`] if the record is damaged or empty, has times that a bag cannot hold, or the bag cannot be written.
 pub fn to_bag<W: Write + Seek>(
     record: impl Read,
     start_ns: u64,
     output: W,
-) -> Result<(W, u64), BagError> {
+) -> Result<(W, u64), ExportError> {
     let mut bag = Bag::new(start_ns, output)?;
     messages(record, &mut Extent::default(), |message| {
         bag.take_in(message)
     })?;
     if bag.ticks == 0 {
-        return Err(BagError::NoTicks);
+        return Err(ExportError::NoTicks);
     }
     bag.writer.finish()?;
     Ok((bag.writer.into_inner(), bag.ticks))
@@ -83,7 +70,7 @@ struct Bag<W: Write + Seek> {
 }
 
 impl<W: Write + Seek> Bag<W> {
-    fn new(start_ns: u64, output: W) -> Result<Self, BagError> {
+    fn new(start_ns: u64, output: W) -> Result<Self, ExportError> {
         let mut writer = mcap::WriteOptions::new()
             .profile("ros2")
             .library(concat!("painleve ", env!("CARGO_PKG_VERSION")))
@@ -140,7 +127,7 @@ impl<W: Write + Seek> Bag<W> {
         })
     }
 
-    fn take_in(&mut self, message: RecordedMessage<'_>) -> Result<(), BagError> {
+    fn take_in(&mut self, message: RecordedMessage<'_>) -> Result<(), ExportError> {
         let topic = TOPICS[message.topic];
         let fields: Map<String, Value> =
             serde_json::from_slice(message.json).map_err(|source| Damage::Message {
@@ -173,7 +160,7 @@ impl<W: Write + Seek> Bag<W> {
     }
 
     /// Writes the joints and the contact.
-    fn state(&mut self, time_ns: u64, fields: &Map<String, Value>) -> Result<(), BagError> {
+    fn state(&mut self, time_ns: u64, fields: &Map<String, Value>) -> Result<(), ExportError> {
         let value = |name: &str| fields.get(name).and_then(Value::as_f64).unwrap_or(f64::NAN);
         // The elbow's encoder measures θ2 − θ1.
         let joints = |first: &str, second: &str| [value(first), value(second) - value(first)];
@@ -198,7 +185,7 @@ impl<W: Write + Seek> Bag<W> {
         self.write(self.contact, time_ns, &cdr.0)
     }
 
-    fn write(&mut self, channel_id: u16, time_ns: u64, cdr: &[u8]) -> Result<(), BagError> {
+    fn write(&mut self, channel_id: u16, time_ns: u64, cdr: &[u8]) -> Result<(), ExportError> {
         let time_ns = self.start_ns + time_ns;
         let header = MessageHeader {
             channel_id,
@@ -268,14 +255,16 @@ impl Cdr {
     }
 }
 
-impl From<McapError> for BagError {
+impl From<McapError> for ExportError {
     fn from(error: McapError) -> Self {
-        Self::Write(reason(error))
+        Self::Write(reason(error).into())
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use std::io;
+
     use super::*;
 
     #[test]

@@ -73,10 +73,10 @@ impl RunTable {
             // Owned, so that a table that is refused closes the pipe.
             let table = Self::of_csv(BufReader::new(reader), names);
             match exported.join() {
-                Ok(Ok(exported)) => match exported.damage {
-                    Some(damage) => Err(ExportError::Nothing(damage).into()),
-                    None => table,
-                },
+                Ok(Ok(exported)) => {
+                    exported.whole()?;
+                    table
+                }
                 // Why it was refused says more than the broken pipe.
                 Ok(Err(ExportError::Write(_))) if table.is_err() => table,
                 Ok(Err(error)) => Err(error.into()),

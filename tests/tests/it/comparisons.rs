@@ -80,6 +80,8 @@ fn what_cannot_be_compared_is_named() {
     record(&bench, "never", &["run.enable_at_s=100"]);
     bench.report(&["export", "a.mcap", "--csv", "--json"]);
     std::fs::write(bench.path("other.csv"), "a,b\n1,2\n").unwrap();
+    let whole = std::fs::read(bench.path("a.mcap")).unwrap();
+    std::fs::write(bench.path("cut.mcap"), &whole[..whole.len() / 2]).unwrap();
     for (words, part) in [
         (
             &["compare", "a.mcap", "never.mcap"][..],
@@ -91,6 +93,10 @@ fn what_cannot_be_compared_is_named() {
         ),
         (&["compare", "a.mcap", "other.csv"], "no column time_s"),
         (&["compare", "a.mcap", "missing.mcap"], "missing.mcap"),
+        (
+            &["compare", "a.mcap", "cut.mcap"],
+            "`painleve export --csv --recover` exports the ",
+        ),
         (
             &["compare", "a.mcap", "a.csv", "--html", "a.csv"],
             "would replace",

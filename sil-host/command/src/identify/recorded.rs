@@ -9,7 +9,7 @@ use painleve_commission::identification::{SlideTick, slide_of};
 use painleve_files::input_file;
 use painleve_identify::Slide;
 use painleve_plant::scenario::Scenario;
-use painleve_record::export::ticks_to_csv;
+use painleve_record::export::{Exported, ticks_to_csv};
 use painleve_shared::counts::{EncoderCounts, ForceCounts, TorqueCounts};
 use painleve_shared::frame::SensorFrame;
 use painleve_study_core::options::PostureOption;
@@ -110,9 +110,8 @@ impl Recorded {
         }
         let mut table = Vec::new();
         let exported = ticks_to_csv(BufReader::new(file), &mut table);
-        if let Some(damage) = exported.map_err(|error| error.to_string())?.damage {
-            return Err(damage.to_string());
-        }
+        let whole = exported.and_then(Exported::whole);
+        whole.map_err(|error| error.to_string())?;
         of_table(table.as_slice())
     }
 }

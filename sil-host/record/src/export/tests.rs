@@ -49,11 +49,11 @@ impl Fates {
                 }
                 Some(exported)
             }
-            Err(ExportError::Nothing(_) | ExportError::NoTicks) => {
+            Err(ExportError::Incomplete(_) | ExportError::NoTicks) => {
                 self.refused += 1;
                 None
             }
-            Err(ExportError::Write(error)) => panic!("{error}"),
+            Err(error) => panic!("{error}"),
         }
     }
 
