@@ -15,7 +15,7 @@ use mcap::records::MessageHeader;
 use serde_json::{Map, Value};
 
 use crate::export::ExportError;
-use crate::fields::{ESTIMATES, PLANT, Read as Kind, SENSOR, TOPICS, Topic};
+use crate::fields::{ESTIMATES, PLANT, Read as Kind, TOPICS, Topic};
 use crate::mcap_log::reason;
 use crate::record_file::{Damage, Extent, RecordedMessage, messages};
 
@@ -30,6 +30,8 @@ const VECTOR: &str = "float64 x\nfloat64 y\nfloat64 z\n";
 const SEPARATOR: &str =
     "================================================================================\n";
 
+/// Latest time by the clock in a bag, ns since 1970: its seconds have 32 bits.
+const LATEST_NS: u64 = i32::MAX as u64 * 1_000_000_000 + 999_999_999;
 /// Names of the joints.
 const JOINTS: [&str; 2] = ["shoulder", "elbow"];
 /// Frame of the force.
@@ -63,8 +65,10 @@ struct Bag<W: Write + Seek> {
     topics: [u16; TOPICS.len()],
     joints: u16,
     contact: u16,
-    /// Time of the last state of the joints.
+    /// Time by the clock of the last state of the joints.
     joints_ns: Option<u64>,
+    /// Time by the clock of the last tick.
+    tick_ns: Option<u64>,
     /// Number of ticks.
     ticks: u64,
 }
@@ -123,6 +127,7 @@ impl<W: Write + Seek> Bag<W> {
             joints,
             contact,
             joints_ns: None,
+            tick_ns: None,
             ticks: 0,
         })
     }
@@ -134,7 +139,12 @@ impl<W: Write + Seek> Bag<W> {
                 topic: topic.name,
                 source,
             })?;
-        let mut cdr = Cdr::stamped(self.start_ns + message.time_ns, "");
+        let stamp_ns = self
+            .start_ns
+            .checked_add(message.time_ns)
+            .filter(|stamp_ns| *stamp_ns <= LATEST_NS)
+            .ok_or(ExportError::Late)?;
+        let mut cdr = Cdr::stamped(stamp_ns, "");
         for field in topic.fields {
             let value = fields.get(field.name);
             match field.read {
@@ -146,25 +156,23 @@ impl<W: Write + Seek> Bag<W> {
                 Kind::Truth(_) => cdr.0.push(u8::from(value == Some(&Value::Bool(true)))),
             }
         }
-        self.write(self.topics[message.topic], message.time_ns, &cdr.0)?;
-        self.ticks += u64::from(topic.name == SENSOR.name);
+        self.write(self.topics[message.topic], stamp_ns, &cdr.0)?;
+        self.ticks += u64::from(self.tick_ns.replace(stamp_ns) != Some(stamp_ns));
         let is_plant = topic.name == PLANT.name;
         // A real arm's angles are known as estimates only.
-        let is_state =
-            is_plant || topic.name == ESTIMATES.name && self.joints_ns != Some(message.time_ns);
+        let is_state = is_plant || topic.name == ESTIMATES.name && self.joints_ns != Some(stamp_ns);
         if is_state && fields.contains_key("theta1_rad") {
-            self.joints_ns = Some(message.time_ns);
-            self.state(message.time_ns, &fields)?;
+            self.joints_ns = Some(stamp_ns);
+            self.state(stamp_ns, &fields)?;
         }
         Ok(())
     }
 
     /// Writes the joints and the contact.
-    fn state(&mut self, time_ns: u64, fields: &Map<String, Value>) -> Result<(), ExportError> {
+    fn state(&mut self, stamp_ns: u64, fields: &Map<String, Value>) -> Result<(), ExportError> {
         let value = |name: &str| fields.get(name).and_then(Value::as_f64).unwrap_or(f64::NAN);
         // The elbow's encoder measures θ2 − θ1.
         let joints = |first: &str, second: &str| [value(first), value(second) - value(first)];
-        let stamp_ns = self.start_ns + time_ns;
         let mut cdr = Cdr::stamped(stamp_ns, "");
         cdr.count(JOINTS.len());
         JOINTS.into_iter().for_each(|name| cdr.text(name));
@@ -176,22 +184,21 @@ impl<W: Write + Seek> Bag<W> {
             cdr.count(pair.len());
             pair.into_iter().for_each(|number| cdr.float(number));
         }
-        self.write(self.joints, time_ns, &cdr.0)?;
+        self.write(self.joints, stamp_ns, &cdr.0)?;
         let mut cdr = Cdr::stamped(stamp_ns, FRAME);
         let force_n = [value("tangential_force_n"), 0.0, value("normal_force_n")];
         for number in force_n.into_iter().chain([0.0; 3]) {
             cdr.float(number);
         }
-        self.write(self.contact, time_ns, &cdr.0)
+        self.write(self.contact, stamp_ns, &cdr.0)
     }
 
-    fn write(&mut self, channel_id: u16, time_ns: u64, cdr: &[u8]) -> Result<(), ExportError> {
-        let time_ns = self.start_ns + time_ns;
+    fn write(&mut self, channel_id: u16, stamp_ns: u64, cdr: &[u8]) -> Result<(), ExportError> {
         let header = MessageHeader {
             channel_id,
             sequence: 0,
-            log_time: time_ns,
-            publish_time: time_ns,
+            log_time: stamp_ns,
+            publish_time: stamp_ns,
         };
         self.writer.write_to_known_channel(&header, cdr)?;
         Ok(())
@@ -218,9 +225,9 @@ struct Cdr(Vec<u8>);
 
 impl Cdr {
     /// Starts a message with its header.
-    fn stamped(time_ns: u64, frame: &str) -> Self {
+    fn stamped(stamp_ns: u64, frame: &str) -> Self {
         let mut cdr = Self(vec![0, 1, 0, 0]);
-        let (seconds, rest) = (time_ns / 1_000_000_000, time_ns % 1_000_000_000);
+        let (seconds, rest) = (stamp_ns / 1_000_000_000, stamp_ns % 1_000_000_000);
         cdr.0.extend((seconds as i32).to_le_bytes());
         cdr.0.extend((rest as u32).to_le_bytes());
         cdr.text(frame);
@@ -266,12 +273,29 @@ mod tests {
     use std::io;
 
     use super::*;
+    use crate::mcap_log::tests::of_messages;
 
     #[test]
     fn the_cause_of_a_failed_write_is_told() {
         let full = io::Cursor::new([0_u8; 16]);
         let error = to_bag(io::empty(), 0, full).map(|_| ()).unwrap_err();
         assert_eq!(error.to_string(), "failed to write whole buffer");
+    }
+
+    #[test]
+    fn ticks_have_distinct_times_up_to_the_last_that_a_bag_can_hold() {
+        // Without a topic of every tick.
+        let record = of_messages("/plant", &[(1, "{}"), (1, "{}"), (2, "{}")]);
+        let to_bag = |start_ns| {
+            let bag = to_bag(&record[..], start_ns, io::Cursor::new(Vec::new()));
+            bag.map(|(_, ticks)| ticks)
+                .map_err(|error| error.to_string())
+        };
+        assert_eq!(to_bag(LATEST_NS - 2), Ok(2));
+        for start_ns in [LATEST_NS - 1, u64::MAX] {
+            let error = to_bag(start_ns).unwrap_err();
+            assert!(error.contains("later than January 2038"), "{error}");
+        }
     }
 
     #[test]

@@ -40,6 +40,29 @@ pub(crate) fn record(folder: &Path, scenario: &Scenario) -> (Vec<u8>, String) {
     (fs::read(mcap).unwrap(), fs::read_to_string(csv).unwrap())
 }
 
+/// Returns a file with these messages of one topic: their times, ns, and their JSON.
+pub(crate) fn of_messages(topic: &str, messages: &[(u64, &str)]) -> Vec<u8> {
+    let mut bytes = std::io::Cursor::new(Vec::new());
+    let mut writer = mcap::Writer::new(&mut bytes).unwrap();
+    let channel_id = writer
+        .add_channel(0, topic, "json", &BTreeMap::new())
+        .unwrap();
+    for &(log_time, json) in messages {
+        let header = MessageHeader {
+            channel_id,
+            sequence: 0,
+            log_time,
+            publish_time: log_time,
+        };
+        writer
+            .write_to_known_channel(&header, json.as_bytes())
+            .unwrap();
+    }
+    writer.finish().unwrap();
+    drop(writer);
+    bytes.into_inner()
+}
+
 /// Messages of a file as topic, time and JSON.
 fn messages(bytes: &[u8]) -> Vec<(String, u64, Value)> {
     mcap::MessageStream::new(bytes)
