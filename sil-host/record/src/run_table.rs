@@ -31,10 +31,10 @@ pub enum TableError {
     )]
     NoColumn(&'static str),
     /// A cell of a column of numbers is none.
-    #[error("line {line}, {column} = '{cell}' is not a number")]
+    #[error("{place}, {column} = '{cell}' is not a number")]
     NotANumber {
-        /// Line of the file.
-        line: u64,
+        /// Line of the file, or time in the record.
+        place: String,
         /// The column.
         column: &'static str,
         /// What is there.
@@ -44,8 +44,8 @@ pub enum TableError {
     #[error("it has no rows, only the names of its columns")]
     NoRows,
     /// Times do not increase.
-    #[error("line {0}: the time is not later than the one before")]
-    Order(usize),
+    #[error("{0}: the time is not later than the one before")]
+    Order(String),
     /// The run is too long.
     #[error("it has more than {MOST_TICKS} ticks")]
     TooLong,
@@ -71,7 +71,7 @@ impl RunTable {
         thread::scope(|scope| {
             let exported = scope.spawn(move || ticks_to_csv(record, io::BufWriter::new(writer)));
             // Owned, so that a table that is refused closes the pipe.
-            let table = Self::of_csv(BufReader::new(reader), names);
+            let table = Self::read(BufReader::new(reader), names, true);
             match exported.join() {
                 Ok(Ok(exported)) => {
                     exported.whole()?;
@@ -90,6 +90,11 @@ impl RunTable {
     /// # Errors
     /// [`TableError`] if it is no table of a run's ticks.
     pub fn of_csv(table: impl Read, names: &[&'static str]) -> Result<Self, TableError> {
+        Self::read(table, names, false)
+    }
+
+    /// Reads the named columns of a table, of which the user knows the lines, or the times if it is `of_record`.
+    fn read(table: impl Read, names: &[&'static str], of_record: bool) -> Result<Self, TableError> {
         let wrong = |source| TableError::Csv { source };
         let mut reader = csv::Reader::from_reader(table);
         let header = reader.headers().map_err(wrong)?.clone();
@@ -106,17 +111,30 @@ impl RunTable {
         };
         let mut row = csv::StringRecord::new();
         while reader.read_record(&mut row).map_err(wrong)? {
-            let time_s = number(&row, TIME, Some(time))?;
-            let is_later = read.time_s.last().is_none_or(|last| time_s > *last);
+            let place = |when: &str, time_s: f64| match row.position() {
+                Some(position) if !of_record => format!("line {}", position.line()),
+                _ => format!("{when} {time_s} s"),
+            };
+            let value = |column, at, time_s| {
+                number(&row, at).map_err(|cell| TableError::NotANumber {
+                    place: place("at", time_s),
+                    column,
+                    cell,
+                })
+            };
+            let time_s = value(TIME, Some(time), f64::NAN)?;
+            let last_s = read.time_s.last().copied();
+            let is_later = last_s.is_none_or(|last_s| time_s > last_s);
             if !is_later || !time_s.is_finite() {
-                return Err(TableError::Order(read.time_s.len() + 2));
+                let place = place("after", last_s.unwrap_or_default());
+                return Err(TableError::Order(place));
             }
             if read.time_s.len() >= MOST_TICKS {
                 return Err(TableError::TooLong);
             }
             read.time_s.push(time_s);
             for ((column, name), place) in read.columns.iter_mut().zip(names).zip(&places) {
-                column.push(number(&row, name, *place)?);
+                column.push(value(name, *place, time_s)?);
             }
         }
         if read.time_s.is_empty() {
@@ -159,29 +177,23 @@ impl RunTable {
     }
 }
 
-/// Reads a cell: a number, or true or false as 1 or 0; NaN if it is empty or the table lacks the column.
-fn number(
-    row: &csv::StringRecord,
-    column: &'static str,
-    place: Option<usize>,
-) -> Result<f64, TableError> {
+/// Reads a cell: a number, or true or false as 1 or 0; NaN if it is empty or the table lacks the column. Returns a cell
+/// of something else.
+fn number(row: &csv::StringRecord, place: Option<usize>) -> Result<f64, String> {
     let cell = place.and_then(|place| row.get(place)).unwrap_or_default();
     match cell.trim() {
         "" => Ok(f64::NAN),
         // Python writes them with a capital.
         "true" | "True" => Ok(1.0),
         "false" | "False" => Ok(0.0),
-        text => text.parse().map_err(|_| TableError::NotANumber {
-            line: row.position().map_or(0, csv::Position::line),
-            column,
-            cell: cell.into(),
-        }),
+        text => text.parse().map_err(|_| cell.into()),
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::mcap_log::tests::of_messages;
 
     const NAMES: [&str; 2] = ["plant.tip_t_m", "estimates.contact"];
 
@@ -202,6 +214,24 @@ mod tests {
         assert!((table.at(contact, 0.25) - 0.5).abs() < 1e-12);
         assert_eq!(table.at(contact, 0.5), 0.0);
         assert!(table.at(contact, -0.1).is_nan() && table.at(contact, 1.1).is_nan());
+    }
+
+    #[test]
+    fn a_place_in_a_record_is_a_time() {
+        for (second, message) in [
+            (
+                (1_000_000_000, "{}"),
+                "after 1.5 s: the time is not later than the one before",
+            ),
+            (
+                (2_000_000_000, r#"{"tip_t_m":"hello"}"#),
+                "at 2 s, plant.tip_t_m = 'hello' is not a number",
+            ),
+        ] {
+            let record = of_messages("/plant", &[(1_500_000_000, "{}"), second]);
+            let error = RunTable::of_record(&record[..], &NAMES).unwrap_err();
+            assert_eq!(error.to_string(), message);
+        }
     }
 
     #[test]
