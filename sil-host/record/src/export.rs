@@ -9,6 +9,7 @@ use serde_json::value::RawValue;
 
 use crate::csv_table::{header, time};
 use crate::fields::{TOPICS, Topic};
+use crate::messages::EVENTS;
 use crate::record_file::{Damage, Extent, RecordedMessage, messages};
 
 /// Why a record cannot be exported.
@@ -85,6 +86,15 @@ impl Exported {
 /// # Errors
 /// [`ExportError`] if there is not even one, or the rows cannot be written.
 pub fn ticks_to_csv(record: impl Read, output: impl Write) -> Result<Exported, ExportError> {
+    ticks_and_events(record, output, |_| Ok(()))
+}
+
+/// As [`ticks_to_csv`]; passes the JSON of every event on.
+pub(crate) fn ticks_and_events(
+    record: impl Read,
+    output: impl Write,
+    mut event: impl FnMut(&[u8]) -> serde_json::Result<()>,
+) -> Result<Exported, ExportError> {
     let mut rows = Rows {
         writer: csv::Writer::from_writer(output),
         row: Row::default(),
@@ -94,7 +104,14 @@ pub fn ticks_to_csv(record: impl Read, output: impl Write) -> Result<Exported, E
     };
     rows.writer.write_record(header())?;
     let mut extent = Extent::default();
-    let damage = match messages(record, &mut extent, |message| rows.take_in(message)) {
+    let read = messages(record, &mut extent, |message| match message.topic {
+        EVENTS => event(message.json).map_err(|source| {
+            let topic = "events";
+            Damage::Message { topic, source }.into()
+        }),
+        _ => rows.take_in(message),
+    });
+    let damage = match read {
         Ok(()) => None,
         Err(Stop::Damage(damage)) => Some(damage),
         Err(Stop::Write(error)) => return Err(error.into()),

@@ -13,6 +13,7 @@ use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOp
 use mcap::{McapError, parse_record};
 
 use crate::fields::TOPICS;
+use crate::messages::EVENTS;
 
 /// Longest record, and longest content of a chunk, bytes. Those of a run have 1 MB.
 pub const MOST_BYTES: usize = 8 << 20;
@@ -60,10 +61,10 @@ pub enum Damage {
     },
 }
 
-/// A message of one of the [`TOPICS`].
+/// A message of one of the [`TOPICS`], or an event.
 #[derive(Clone, Copy, Debug)]
 pub struct RecordedMessage<'a> {
-    /// Number of the topic in [`TOPICS`].
+    /// Number of the topic in [`TOPICS`], or [`EVENTS`].
     pub topic: usize,
     /// Time of the message, ns.
     pub time_ns: u64,
@@ -78,7 +79,7 @@ pub struct Extent {
     pub whole_bytes: u64,
 }
 
-/// Passes every message of the [`TOPICS`] on, in the order of the file. All messages that were passed on before an
+/// Passes every message of the [`TOPICS`] and every event on, in the order of the file. All messages that were passed on before an
 /// error are whole. Reads in small parts: give it a buffered file.
 ///
 /// # Errors
@@ -201,7 +202,8 @@ impl Channels {
             Record::Channel(channel) => {
                 let name = channel.topic.trim_start_matches('/');
                 let topic = TOPICS.iter().position(|topic| topic.name == name);
-                self.0.insert(channel.id, topic);
+                let events = (name == "events").then_some(EVENTS);
+                self.0.insert(channel.id, topic.or(events));
             }
             Record::Message { header, data } => {
                 let topic = self.0.get(&header.channel_id).ok_or(Damage::NoChannel)?;

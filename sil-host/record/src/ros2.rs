@@ -133,7 +133,10 @@ impl<W: Write + Seek> Bag<W> {
     }
 
     fn take_in(&mut self, message: RecordedMessage<'_>) -> Result<(), ExportError> {
-        let topic = TOPICS[message.topic];
+        let Some(topic) = TOPICS.get(message.topic) else {
+            // An event.
+            return Ok(());
+        };
         let fields: Map<String, Value> =
             serde_json::from_slice(message.json).map_err(|source| Damage::Message {
                 topic: topic.name,

@@ -1,9 +1,12 @@
 //! The ticks of a run as columns of numbers, read from a record or from its table.
 
+use std::borrow::Cow;
 use std::io::{self, BufReader, Read};
 use std::thread;
 
-use crate::export::{ExportError, ticks_to_csv};
+use serde::Deserialize;
+
+use crate::export::{ExportError, ticks_and_events};
 
 /// Name of the column of times.
 const TIME: &str = "time_s";
@@ -47,7 +50,7 @@ pub enum TableError {
     #[error("{0}: the time is not later than the one before")]
     Order(String),
     /// The run is too long.
-    #[error("it has more than {MOST_TICKS} ticks")]
+    #[error("it has more than {MOST_TICKS} ticks or lift-offs")]
     TooLong,
 }
 
@@ -56,26 +59,52 @@ pub enum TableError {
 pub struct RunTable {
     /// Simulated or measured time, s, increasing.
     pub time_s: Vec<f64>,
+    /// Exact times of the lift-offs, s, from a record's events; `None` of a table, which has only ticks.
+    pub(crate) lift_offs_s: Option<Vec<f64>>,
     /// The columns that were asked for, in their order.
     columns: Vec<Vec<f64>>,
     names: Vec<&'static str>,
 }
 
+/// What is read of an event.
+#[derive(Deserialize)]
+struct EventTime<'a> {
+    time_s: f64,
+    #[serde(borrow)]
+    kind: Cow<'a, str>,
+}
+
 impl RunTable {
-    /// Reads the named columns of a record.
+    /// Reads the named columns of a record, and its lift-offs.
     ///
     /// # Errors
     /// [`TableError`] if it is damaged or has no ticks.
     pub fn of_record(record: impl Read + Send, names: &[&'static str]) -> Result<Self, TableError> {
         let (reader, writer) = io::pipe()?;
         thread::scope(|scope| {
-            let exported = scope.spawn(move || ticks_to_csv(record, io::BufWriter::new(writer)));
+            let exported = scope.spawn(move || {
+                let mut lift_offs_s = Vec::new();
+                ticks_and_events(record, io::BufWriter::new(writer), |json| {
+                    let event: EventTime<'_> = serde_json::from_slice(json)?;
+                    if event.kind == "lift-off" && lift_offs_s.len() <= MOST_TICKS {
+                        lift_offs_s.push(event.time_s);
+                    }
+                    Ok(())
+                })
+                .map(|exported| (exported, lift_offs_s))
+            });
             // Owned, so that a table that is refused closes the pipe.
             let table = Self::read(BufReader::new(reader), names, true);
             match exported.join() {
-                Ok(Ok(exported)) => {
+                Ok(Ok((exported, lift_offs_s))) => {
                     exported.whole()?;
-                    table
+                    if lift_offs_s.len() > MOST_TICKS {
+                        return Err(TableError::TooLong);
+                    }
+                    table.map(|table| Self {
+                        lift_offs_s: Some(lift_offs_s),
+                        ..table
+                    })
                 }
                 // Why it was refused says more than the broken pipe.
                 Ok(Err(ExportError::Write(_))) if table.is_err() => table,
@@ -106,6 +135,7 @@ impl RunTable {
         }
         let mut read = Self {
             time_s: Vec::new(),
+            lift_offs_s: None,
             columns: vec![Vec::new(); names.len()],
             names: names.to_vec(),
         };

@@ -101,12 +101,17 @@ impl Run {
         self.table.time_s.get(tick).copied()
     }
 
-    /// Returns the times at which the tip leaves the belt, s; `None` for a real arm, whose mode is not known.
+    /// Returns the times at which the tip leaves the belt, s; `None` for a real arm, whose mode is not known. Of a table
+    /// they are the first ticks in flight.
     pub fn lift_offs_s(&self) -> Option<Vec<f64>> {
-        let changes = self.table.changes("plant.mode_number");
-        let lift_offs = changes.filter(|(_, from, to)| *from > 0.0 && *to == 0.0);
+        let seen_at_ticks = || {
+            let changes = self.table.changes("plant.mode_number");
+            let lift_offs = changes.filter(|(_, from, to)| *from > 0.0 && *to == 0.0);
+            lift_offs.map(|(time_s, ..)| time_s).collect()
+        };
         let is_simulated = self.table.knows("plant.p_per_kg");
-        is_simulated.then(|| lift_offs.map(|(time_s, ..)| time_s).collect())
+        let exact = self.table.lift_offs_s.clone();
+        is_simulated.then(|| exact.unwrap_or_else(seen_at_ticks))
     }
 }
 
@@ -149,6 +154,8 @@ pub struct Outcome {
     pub duration_s: f64,
     /// Number of times that the tip leaves the belt after the event; absent for a run of a real arm.
     pub lift_offs: Option<u64>,
+    /// Whether they are those that the ticks of a table show: none shorter than a tick, and each up to a tick late.
+    pub lift_offs_at_ticks: bool,
     /// Time of the first after the event, s.
     pub first_lift_off_s: Option<f64>,
     /// Number of the fault at the end, 0 for none.
@@ -209,8 +216,14 @@ impl Outcome {
             self.run.clone(),
             decimals(self.event_s, 3),
             decimals(self.duration_s, 3),
-            self.lift_offs
-                .map_or_else(unknown, |count| count.to_string()),
+            self.lift_offs.map_or_else(unknown, |count| {
+                let how = if self.lift_offs_at_ticks {
+                    " at ticks"
+                } else {
+                    ""
+                };
+                format!("{count}{how}")
+            }),
             number(self.first_lift_off_s, 3),
             match self.fault {
                 0 => "none".into(),
@@ -349,6 +362,7 @@ impl<'a> Comparison<'a> {
                 event_s: *zero_s,
                 duration_s: end_s - zero_s,
                 first_lift_off_s: first.map(|time_s| time_s - zero_s),
+                lift_offs_at_ticks: lift_offs.is_some() && table.lift_offs_s.is_none(),
                 lift_offs: lift_offs.map(|times| times.len() as u64),
                 fault: fault.unwrap_or_default() as u64,
                 final_tip_mm: at_end(&values[0]),
@@ -362,6 +376,7 @@ impl<'a> Comparison<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::mcap_log::tests::{record, scenario};
 
     /// A run whose tip moves at 10 mm/s from ENABLE on, which is on the belt 0.1 s later.
     fn run(label: &str, enabled_s: f64, offset_m: f64, columns: &str) -> Run {
@@ -461,6 +476,30 @@ mod tests {
             (outcomes[0].lift_offs, outcomes[0].first_lift_off_s),
             (None, None)
         );
+    }
+
+    #[test]
+    fn a_record_has_the_lift_offs_that_no_tick_shows() {
+        let folder = tempfile::tempdir().unwrap();
+        // Its first lift-off is at its first instant.
+        let scenario = scenario("open-loop-bounce", &["run.duration_s=0.01"]);
+        let (record, csv) = record(folder.path(), &scenario);
+        let runs = [
+            RunTable::of_record(&record[..], &COLUMNS),
+            RunTable::of_csv(csv.as_bytes(), &COLUMNS),
+        ]
+        .map(|table| Run {
+            label: "run".into(),
+            table: table.unwrap(),
+            scenario: None,
+        });
+        let outcomes = Comparison::new(&runs, Alignment::Start).unwrap().outcomes();
+        let found: Vec<_> = outcomes
+            .iter()
+            .map(|one| (one.first_lift_off_s, one.cells()[3].clone()))
+            .collect();
+        assert_eq!(found[0], (Some(0.0), "1".into()));
+        assert_eq!(found[1], (None, "0 at ticks".into()));
     }
 
     #[test]
