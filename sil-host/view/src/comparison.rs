@@ -6,7 +6,8 @@ use painleve_record::comparison::{Comparison, Difference, Outcome, Run};
 use painleve_shared::LinkMotion;
 use serde_json::{Value, json};
 
-use crate::page::{description, html};
+use crate::events::Totals;
+use crate::page::{LISTED_EVENTS, description, html};
 use crate::row::{Follower, ROW_BYTES, Row};
 use crate::thinning::Thinned;
 
@@ -23,7 +24,9 @@ pub fn comparison_html(
         .iter()
         .map(|run| BASE64.encode(&rows(run, run.scenario.as_ref().unwrap_or(scenario))));
     page["rows"] = encoded.next().into();
-    page["events"] = runs.first().map(events).into();
+    let (listed, totals) = runs.first().map(events).unwrap_or_default();
+    page["events"] = listed.into();
+    page["totals"] = json!(totals);
     let others = runs.iter().enumerate().skip(1).zip(encoded);
     page["comparison"] = json!({
         "label": runs.first().map(|run| &run.label),
@@ -61,8 +64,8 @@ fn rows(run: &Run, scenario: &Scenario) -> Vec<u8> {
     bytes
 }
 
-/// Returns the lift-offs and faults of a run as the page lists them.
-fn events(run: &Run) -> Vec<Value> {
+/// Returns the lift-offs and faults of a run as the page lists and counts them.
+fn events(run: &Run) -> (Vec<Value>, Totals) {
     let lift_offs = run.lift_offs_s().into_iter().flatten();
     let lift_offs = lift_offs.map(|time_s| (time_s, "lift-off", "lift-off".to_owned()));
     let faults = run
@@ -73,10 +76,15 @@ fn events(run: &Run) -> Vec<Value> {
         .map(|(time_s, _, fault)| (time_s, "fault", format!("fault {fault}")));
     let mut events: Vec<_> = lift_offs.chain(faults).collect();
     events.sort_by(|(one, ..), (other, ..)| one.total_cmp(other));
-    events
-        .into_iter()
-        .map(|(time_s, kind, text)| json!([time_s, kind, text]))
-        .collect()
+    let mut totals = Totals::default();
+    let entries = events.into_iter().map(|(time_s, kind, text)| {
+        let entry = json!([time_s, kind, text]);
+        totals.add(kind, || entry.clone());
+        entry
+    });
+    let mut entries: Vec<Value> = entries.collect();
+    entries.truncate(LISTED_EVENTS);
+    (entries, totals)
 }
 
 /// Returns the tables under the charts.
@@ -129,7 +137,7 @@ mod tests {
     use painleve_record::comparison::COLUMNS;
     use painleve_record::run_table::RunTable;
 
-    fn events_of(table: &str) -> Vec<Value> {
+    fn events_of(table: &str) -> (Vec<Value>, Totals) {
         let table = RunTable::of_csv(table.as_bytes(), &COLUMNS).unwrap();
         let (label, scenario) = ("run".into(), None);
         events(&Run {
@@ -146,9 +154,28 @@ mod tests {
         let rows = |p: &str| format!("{header}\n0,0,3,{p},0\n1,0,0,{p},0\n2,0,0,{p},8\n");
         let fault = json!([2.0, "fault", "fault 8"]);
         let lift_off = json!([1.0, "lift-off", "lift-off"]);
-        assert_eq!(events_of(&rows("1.5")), [lift_off, fault.clone()]);
-        assert_eq!(events_of(&rows("")), [fault]);
+        assert_eq!(events_of(&rows("1.5")).0, [lift_off, fault.clone()]);
+        assert_eq!(events_of(&rows("")).0, [fault]);
         let nothing = events_of("time_s,estimates.tip_t_m\n0,0\n1,0\n2,0\n");
-        assert_eq!(nothing, Vec::<Value>::new());
+        assert_eq!(nothing.0, Vec::<Value>::new());
+    }
+
+    #[test]
+    fn events_that_are_not_listed_are_counted() {
+        let mut table =
+            "time_s,plant.mode_number,plant.p_per_kg,actuator.fault_number\n".to_owned();
+        for tick in 0..2400 {
+            table += &format!("{tick},{},1.5,{}\n", 3 * (1 - tick % 2), tick / 2399);
+        }
+        let (listed, totals) = events_of(&table);
+        assert_eq!(listed.len(), LISTED_EVENTS);
+        let (lift_off, fault) = (
+            json!([1.0, "lift-off", "lift-off"]),
+            json!([2399.0, "fault", "fault 1"]),
+        );
+        assert_eq!(
+            json!(totals),
+            json!({ "lift-off": [1200, lift_off], "fault": [1, fault] })
+        );
     }
 }

@@ -18,7 +18,11 @@ pub struct Totals(BTreeMap<&'static str, (u64, Value)>);
 impl Totals {
     /// Counts an event.
     pub fn count(&mut self, event: &RunEvent) {
-        let first = || (0, entry(event));
-        self.0.entry(event.kind.name()).or_insert_with(first).0 += 1;
+        self.add(event.kind.name(), || entry(event));
+    }
+
+    /// Counts an event of a kind, which the page lists as this entry.
+    pub(crate) fn add(&mut self, kind: &'static str, entry: impl FnOnce() -> Value) {
+        self.0.entry(kind).or_insert_with(|| (0, entry())).0 += 1;
     }
 }

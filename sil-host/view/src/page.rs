@@ -14,7 +14,7 @@ use crate::row::{BYTE_COLUMNS, COLUMNS, Follower, ROW_BYTES, Row};
 use crate::thinning::Thinned;
 
 /// Number of events listed individually; all are counted.
-const LISTED_EVENTS: usize = 1000;
+pub(crate) const LISTED_EVENTS: usize = 1000;
 
 const TEMPLATE: &str = include_str!("../page/index.html");
 const UPLOT: &str = include_str!("../page/uplot/uPlot.iife.min.js");
