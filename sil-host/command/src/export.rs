@@ -3,7 +3,7 @@
 use std::io::{self, BufReader, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
-use clap::Args;
+use clap::{ArgGroup, Args};
 use painleve_files::atomic_file::{AtomicFile, AtomicFileError, commit_all};
 use painleve_files::input_file;
 use painleve_process::interrupt::Interrupt;
@@ -18,11 +18,12 @@ use super::{CommandError, distinct_files, say};
 
 /// Options of `painleve export`.
 #[derive(Debug, Args)]
+#[command(group = ArgGroup::new("formats").args(["csv", "ros2"]).required(true).multiple(true))]
 pub struct ExportArguments {
     /// Record of a run, for example out/run.mcap.
     record: PathBuf,
     /// Write CSV, by default beside the record.
-    #[arg(long, value_name = "PATH", num_args = 0..=1, required_unless_present = "ros2")]
+    #[arg(long, value_name = "PATH", num_args = 0..=1)]
     csv: Option<Option<PathBuf>>,
     /// Write a ROS 2 bag, by default beside the record.
     #[arg(long, value_name = "PATH", num_args = 0..=1, conflicts_with = "recover")]

@@ -89,5 +89,9 @@ fn what_is_no_record_makes_no_bag() {
         "{}",
         errors(&output)
     );
+    let neither = errors(&bench.run(&["export", "other.mcap"]));
+    for option in ["--csv", "--ros2"] {
+        assert!(neither.contains(option), "{neither}");
+    }
     assert_eq!(bench.files(), ["other.mcap"]);
 }
