@@ -144,7 +144,8 @@ pub const SENSOR: Topic = Topic {
         normal_force_counts: Whole = sample.sensor.normal_force.0.into();
         /// Tangential force, counts.
         tangential_force_counts: Whole = sample.sensor.tangential_force.0.into();
-        /// Digital inputs, one bit each: 1 enable, 2 reset.
+        /// Digital inputs, one bit each: 1 enable, 2 reset, 4 arming refused, 8 stage not ready,
+        /// 16 gap against force, 32 winding hot, 2147483648 overload.
         inputs: Whole = sample.sensor.inputs.0.into();
         /// Whether the controller received the frame.
         delivered: Truth = sample.delivered;
