@@ -91,7 +91,7 @@ impl Search {
                 let is_best = excess_per_kg > most_per_kg;
                 let best_m = if is_best { point_m } else { best_m };
                 if refused >= MOST_REFUSED {
-                    // No point is admissible: the best one, from where the next search goes on.
+                    // No point is admissible: the best one.
                     return ControlFlow::Break(best_m);
                 }
                 let entering = Stage::Entering {
