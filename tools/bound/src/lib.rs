@@ -66,7 +66,7 @@ pub enum BoundError {
         address: u32,
     },
     /// A function is recursive.
-    #[error("the function at 0x{address:08x} calls itself")]
+    #[error("the function at 0x{address:08x} calls itself, or one that calls it")]
     Recursion {
         /// Address.
         address: u32,

@@ -82,6 +82,8 @@ pub struct Analysis<'a> {
     program: &'a Program<'a>,
     limits: &'a Limits,
     known: BTreeMap<u32, Option<Worst>>,
+    /// Functions whose analysis has begun.
+    open: BTreeSet<u32>,
     not_called: BTreeSet<u32>,
 }
 
@@ -92,6 +94,7 @@ impl<'a> Analysis<'a> {
             program,
             limits,
             known: BTreeMap::new(),
+            open: BTreeSet::new(),
             not_called: BTreeSet::new(),
         }
     }
@@ -138,10 +141,12 @@ impl<'a> Analysis<'a> {
             // As if it did not return: no path leads on from the call.
             return Ok(None);
         }
-        match self.known.get(&entry) {
-            Some(worst) => return Ok(worst.clone()),
-            None => self.known.insert(entry, None),
-        };
+        if let Some(worst) = self.known.get(&entry) {
+            return Ok(worst.clone());
+        }
+        if !self.open.insert(entry) {
+            return Err(BoundError::Recursion { address: entry });
+        }
         let program = self.program;
         let function = program.function(entry);
         let (graph, values) = function.ok_or(BoundError::NotFollowed { address: entry })?;
@@ -163,9 +168,6 @@ impl<'a> Analysis<'a> {
         let mut uses_float = graph.uses_float();
         for block in graph.blocks.values() {
             if let Some(callee) = block.call {
-                if callee == graph.entry {
-                    return Err(BoundError::Recursion { address: callee });
-                }
                 let worst = self.of(callee)?;
                 uses_float |= worst.as_ref().is_some_and(|worst| worst.uses_float);
                 calls.insert(

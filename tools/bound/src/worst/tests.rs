@@ -229,8 +229,15 @@ fn integer_instructions_are_executed_during_a_division() {
 #[test]
 fn a_function_that_calls_itself_is_refused() {
     // bl here; bx lr
-    let error = worst(&[0xf7ff, 0xfffe, 0x4770], &[]).unwrap_err();
-    assert!(matches!(error, BoundError::Recursion { .. }), "{error}");
+    let itself = [0xf7ff, 0xfffe, 0x4770];
+    // bl other; bx lr; other: cmp r0, #0; beq end; bl first; end: bx lr
+    let one_another = [
+        0xf000, 0xf801, 0x4770, 0x2800, 0xd001, 0xf7ff, 0xfff9, 0x4770,
+    ];
+    for code in [&itself[..], &one_another] {
+        let error = worst(code, &[]).unwrap_err();
+        assert!(matches!(error, BoundError::Recursion { .. }), "{error}");
+    }
 }
 
 #[test]
