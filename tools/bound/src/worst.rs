@@ -236,7 +236,8 @@ impl<'a> Analysis<'a> {
         let mut incoming: BTreeMap<u32, Vec<_>> = BTreeMap::new();
         let mut outgoing: BTreeMap<u32, Vec<_>> = BTreeMap::new();
         let mut edges = Vec::new();
-        let start = problem.add_var(f64::from(costs[&graph.entry]), (1.0, 1.0));
+        let first = costs[&graph.entry] + entered.get(&graph.entry).copied().unwrap_or(0);
+        let start = problem.add_var(f64::from(first), (1.0, 1.0));
         incoming.entry(graph.entry).or_default().push(start);
         let mut ends = Vec::new();
         for (from, block) in &graph.blocks {
@@ -321,8 +322,7 @@ impl<'a> Analysis<'a> {
             peripheral_accesses,
         };
         let mut visits: BTreeMap<u32, Visit> = BTreeMap::new();
-        let first = f64::from(costs[&graph.entry]);
-        let flows = [(graph.entry, graph.entry, start, first)]
+        let flows = [(graph.entry, graph.entry, start, f64::from(first))]
             .into_iter()
             .chain(
                 edges
