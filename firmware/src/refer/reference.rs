@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 pub const MAXIMUM_SEGMENTS: usize = 16;
 
 /// Largest number of segments that end in one tick: one that has lasted, and two without duration.
-const MOST_ENDS: usize = 3;
+pub const MOST_ENDS: usize = 3;
 
 settings! {
     /// One piece of the reference z_t*(t). The longest duration is still countable at the highest control rate.

@@ -5,13 +5,12 @@ use std::collections::BTreeSet;
 use painleve_drivers::encoders::EncoderDriver;
 use painleve_drivers::exchange::{Dialogue, SelectTiming};
 use painleve_drivers::force_cell::ForceCellDriver;
+use painleve_firmware::refer::reference::MOST_ENDS;
+use painleve_firmware::supervise::lapses::BOARD_LAPSES;
 
 use crate::cycles::Chip;
 use crate::graph::Graph;
 use crate::image::Image;
-
-/// Segments of a reference that end in one tick (`firmware/src/refer/reference.rs`).
-const MOST_ENDS: u32 = 3;
 
 /// Bytes that the interrupts clear at once, at most; every call is checked.
 pub const CLEARED_BYTES: u32 = 64;
@@ -87,8 +86,8 @@ impl Limits {
         Self(vec![
             declare(
                 "ReferenceGenerator::prepare",
-                Limit::Times(MOST_ENDS),
-                "three segments end per tick",
+                Limit::Times(MOST_ENDS as u32),
+                "segments that end per tick",
             ),
             declare(
                 "::set_up",
@@ -97,15 +96,10 @@ impl Limits {
             ),
             declare(
                 "OpenLoop::note_lapses",
-                Limit::Times(4),
-                "four lapses that a board reports",
+                Limit::Times(BOARD_LAPSES.len() as u32),
+                "lapses that a board reports",
             ),
-            declare("plausibility::", Limit::Times(2), "two joints"),
-            declare(
-                "div_rem",
-                Limit::Times(64),
-                "a division of 64 bits: at least one bit of the quotient per iteration",
-            ),
+            declare("Plausibility::check", Limit::Times(2), "two joints"),
             declare("set_bytes", Limit::Times(3), "a word's bytes at either end"),
             declare(
                 CLEARS,
