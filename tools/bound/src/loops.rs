@@ -10,7 +10,7 @@ use painleve_firmware::supervise::lapses::BOARD_LAPSES;
 
 use crate::cycles::Chip;
 use crate::graph::Graph;
-use crate::image::Image;
+use crate::image::{Frame, Image};
 
 /// Bytes that the interrupts clear at once, at most; every call is checked.
 pub const CLEARED_BYTES: u32 = 64;
@@ -132,9 +132,9 @@ impl Limits {
         Self(all)
     }
 
-    /// Returns the limit of a loop that consists of these blocks: that of the first declaration
-    /// whose function is a source function, inlined or not, of the loop's instructions. The first block
-    /// is executed once more than the loop iterates, unless the loop ends only where it begins anew.
+    /// Returns the limit of a loop that consists of these blocks: that of the first declaration whose function is a source
+    /// function, inlined or not, of all branches back to its first block; the body may contain inlined functions. The first
+    /// block is executed once more than the loop iterates, unless the loop ends only where it begins anew.
     pub fn of(
         &self,
         image: &Image,
@@ -142,15 +142,13 @@ impl Limits {
         header: u32,
         blocks: &BTreeSet<u32>,
     ) -> Option<Limit> {
-        let mut all = Vec::new();
-        for address in blocks {
-            for instruction in &graph.blocks[address].instructions {
-                all.extend(image.frames(instruction.address));
-            }
-        }
+        let ends = blocks.iter().map(|address| &graph.blocks[address]);
+        let ends = ends.filter(|block| block.successors.iter().any(|(to, _)| *to == header));
+        let ends = ends.filter_map(|block| block.instructions.last());
+        let ends: Vec<_> = ends.map(|it| image.frames(it.address)).collect();
         let holds = |declared: &&Declared| {
-            all.iter()
-                .any(|frame| frame.function.contains(declared.function))
+            let of = |frame: &Frame| frame.function.contains(declared.function);
+            ends.iter().all(|frames| frames.iter().any(of))
         };
         let declared = self.0.iter().find(holds)?;
         match declared.limit {

@@ -27,8 +27,20 @@ fn worst_without(
     limits: &[(&'static str, Limit)],
     left_out: &BTreeSet<u32>,
 ) -> Result<Option<Worst>, BoundError> {
+    worst_of_image(&image(at, code), at, limits, left_out)
+}
+
+fn image(at: u32, code: &[u16]) -> Image {
     let bytes: Vec<u8> = code.iter().flat_map(|half| half.to_le_bytes()).collect();
-    let image = Image::of_code(at, &bytes, "kernel");
+    Image::of_code(at, &bytes, "kernel")
+}
+
+fn worst_of_image(
+    image: &Image,
+    at: u32,
+    limits: &[(&'static str, Limit)],
+    left_out: &BTreeSet<u32>,
+) -> Result<Option<Worst>, BoundError> {
     let declared = limits.iter().map(|(function, limit)| Declared {
         function,
         limit: *limit,
@@ -38,7 +50,7 @@ fn worst_without(
     // r1 to r5 point to variables.
     let known = ARGUMENTS[1..].iter().chain(&KEPT_BY_CALLS[..2]);
     let known = known.map(|it| (*it, Value::Data)).collect();
-    let program = Program::of(&image, BTreeMap::from([(at, known)]), &BTreeSet::new())?;
+    let program = Program::of(image, BTreeMap::from([(at, known)]), &BTreeSet::new())?;
     Analysis::new(&program, &limits).without(left_out).of(at)
 }
 
@@ -101,6 +113,19 @@ fn a_waiting_loop_costs_its_time_and_two_iterations() {
 fn a_loop_without_a_limit_is_refused_by_name() {
     let error = worst(&COUNT_DOWN, &[("other", Limit::Times(1))]).unwrap_err();
     assert!(error.to_string().contains("in kernel"), "{error}");
+}
+
+/// The loop is `kernel`'s; `inlined` is in its body.
+#[test]
+fn a_loop_does_not_have_the_limit_of_code_inlined_into_it() {
+    let mut image = image(AT, &COUNT_DOWN);
+    image.begin_function(AT + 2, "inlined");
+    image.begin_function(AT + 4, "kernel");
+    let worst =
+        |function| worst_of_image(&image, AT, &[(function, Limit::Times(3))], &BTreeSet::new());
+    let error = worst("inlined").unwrap_err();
+    assert!(matches!(error, BoundError::Unbounded { .. }), "{error}");
+    assert_eq!(worst("kernel").unwrap().unwrap().instructions, 2 + 2 * 3);
 }
 
 #[test]
