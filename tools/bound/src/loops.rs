@@ -18,6 +18,15 @@ pub const CLEARED_BYTES: u32 = 64;
 /// Function that clears memory: its second argument is the number of bytes.
 pub const CLEARS: &str = "__aeabi_memclr";
 
+/// Functions that end the program: no path leads on from them.
+const PANICS: &str = "core::panicking::";
+
+/// Returns the functions of an image that end the program.
+pub fn panics(image: &Image) -> BTreeSet<u32> {
+    let panics = image.functions().filter(|(.., name)| name.contains(PANICS));
+    panics.map(|(start, ..)| start).collect()
+}
+
 /// Functions that a tick does not call if the bound holds, with the reason. Each has to be out of line.
 pub const NOT_CALLED: [(&str, &str); 4] = [
     (
@@ -105,11 +114,6 @@ impl Limits {
                 CLEARS,
                 Limit::Times(CLEARED_BYTES / 16),
                 "sixteen bytes per iteration, then three words and three bytes",
-            ),
-            declare(
-                "__aeabi_mem",
-                Limit::Times(8),
-                "sixteen bytes per iteration: at most 128 are moved per tick",
             ),
         ])
     }

@@ -10,7 +10,7 @@ use serde::Serialize;
 
 use crate::cycles::Chip;
 use crate::image::Image;
-use crate::loops::{EVALUATES, Limits, NOT_CALLED, STARTS};
+use crate::loops::{EVALUATES, Limits, NOT_CALLED, STARTS, panics};
 use crate::sections::{self, Section};
 use crate::values::{Program, Values};
 use crate::worst::{Analysis, Loop, Visit, Worst};
@@ -81,7 +81,7 @@ pub struct Bound {
     pub proves_hz: u32,
     /// The same with two sensors on each channel, Hz.
     pub proves_hz_with_both: u32,
-    /// Functions that the bounds leave out ([`NOT_CALLED`]).
+    /// Functions that the bounds leave out: those that end the program, and [`NOT_CALLED`].
     #[serde(skip)]
     pub not_called: BTreeSet<u32>,
     /// The function whose call in a control interrupt shows that the tick starts the estimates ([`EVALUATES`]).
@@ -149,7 +149,8 @@ impl Bound {
         let handlers = handlers.chain(SENSOR_INTERRUPTS).map(address_of);
         let handlers = handlers.collect::<Result<Vec<_>, _>>()?;
         let entries = handlers.iter().map(|it| (*it, Values::new())).collect();
-        let program = Program::of(image, entries, &BTreeSet::new())?;
+        let panics = panics(image);
+        let program = Program::of(image, entries, &panics)?;
         let with_entry = |worst: &Worst| worst.cycles + chip.around(worst.entry, worst.uses_float);
         let worst_of = |handler: &str, analysis: &mut Analysis<'_>| {
             let entry = address_of(handler)?;
@@ -164,7 +165,7 @@ impl Bound {
             })
         };
         let limits = Limits::of_tick(chip);
-        let mut not_called = BTreeSet::new();
+        let mut not_called = panics;
         for (function, _) in NOT_CALLED {
             not_called.insert(out_of_line(function)?);
         }
@@ -179,9 +180,11 @@ impl Bound {
                 path: stretches(image, handler, &analysis.path_with_calls(&worst)),
             })
         };
+        let left_out = |functions: &BTreeSet<u32>| -> BTreeSet<u32> {
+            not_called.union(functions).copied().collect()
+        };
         let without = |functions: &BTreeSet<u32>| {
-            let all = not_called.union(functions).copied().collect();
-            Analysis::new(&program, &limits).without(&all)
+            Analysis::new(&program, &limits).without(&left_out(functions))
         };
         let mut analysis = without(&BTreeSet::new());
         let update = of_handler(UPDATE_INTERRUPT, &mut analysis)?;
@@ -216,8 +219,8 @@ impl Bound {
         for (bus, bus_hz) in SENSOR_BUSES.into_iter().zip(chip.bus_hz) {
             let limits = Limits::of_sensor_bus(chip, bus.timing, bus_hz);
             let takes = BTreeSet::from([out_of_line(bus.takes)?]);
-            let mut of_last_word = Analysis::new(&program, &limits);
-            let mut of_word = Analysis::new(&program, &limits).without(&takes);
+            let mut of_last_word = Analysis::new(&program, &limits).without(&not_called);
+            let mut of_word = Analysis::new(&program, &limits).without(&left_out(&takes));
             let last = with_entry(&worst_of(bus.handler, &mut of_last_word)?);
             let other = with_entry(&worst_of(bus.handler, &mut of_word)?);
             peripheral_accesses.append(&mut accesses(&of_last_word));

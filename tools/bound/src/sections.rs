@@ -12,7 +12,7 @@ use crate::BoundError;
 use crate::graph::{Block, Graph};
 use crate::image::Image;
 use crate::instruction::{Decoder, Instruction};
-use crate::loops::Limits;
+use crate::loops::{Limits, panics};
 use crate::values::{Program, Values, within};
 use crate::worst::Analysis;
 
@@ -27,9 +27,6 @@ pub const LEFT_OUT: [(&str, &str); 5] = [
     ("main", "the start: no task runs"),
     ("main::__rtic_init_resources", "the start: no task runs"),
 ];
-
-/// Functions that end the program: no path leads on from them.
-const PANICS: &str = "core::panicking::";
 
 /// A section that masks the control interrupt.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
@@ -61,8 +58,7 @@ impl Display for Section {
 /// [`BoundError`] for code that cannot be bounded.
 pub fn of(image: &Image, except: &[u32]) -> Result<Vec<Section>, BoundError> {
     let decoder = Decoder::new()?;
-    let panics = image.functions().filter(|(.., name)| name.contains(PANICS));
-    let panics: BTreeSet<u32> = panics.map(|(start, ..)| start).collect();
+    let panics = panics(image);
     let limits = Limits::of_tick(image.chip);
     let mut sections = BTreeSet::new();
     for (start, end, name) in image.functions() {
