@@ -71,6 +71,12 @@ pub enum BoundError {
         /// Address.
         address: u32,
     },
+    /// A section masks interrupts that are masked already: what restores them does not end it.
+    #[error("the section at 0x{address:08x} masks the interrupts twice")]
+    MaskedTwice {
+        /// Address.
+        address: u32,
+    },
     /// A loop has several entries.
     #[error("the loop at 0x{address:08x} has several entries")]
     Irreducible {

@@ -117,7 +117,7 @@ fn unmasks(instruction: &Instruction) -> bool {
     starts.iter().any(|it| instruction.text.starts_with(it))
 }
 
-/// Returns the part of a graph from an instruction of a block to the first that unmasks.
+/// Returns the part of a graph from an instruction of a block, which masks, to the first that unmasks.
 fn part(
     graph: &Graph,
     block: &Block,
@@ -142,6 +142,10 @@ fn part(
         } else if block.call.is_some_and(|callee| panics.contains(&callee)) {
             block.successors.clear();
         }
+        let mut others = block.instructions.iter().filter(|it| it.address != entry);
+        if others.any(masks) {
+            return Err(BoundError::MaskedTwice { address: entry });
+        }
         for (to, _) in &block.successors {
             if !blocks.contains_key(to)
                 && let Some(next) = graph.blocks.get(to)
@@ -152,4 +156,44 @@ fn part(
         blocks.insert(address, block);
     }
     Ok(Graph { entry, blocks })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const AT: u32 = 0x0800_1000;
+
+    /// A section that begins with the first instruction, and ends in the same block or in the next.
+    fn part_of(code: &[u16]) -> Result<Graph, BoundError> {
+        let code: Vec<u8> = code.iter().flat_map(|half| half.to_le_bytes()).collect();
+        let image = Image::of_code(AT, &code, "section");
+        let graph = Graph::of(&image, &Decoder::new()?, AT)?;
+        part(&graph, &graph.blocks[&AT], 0, &BTreeSet::new())
+    }
+
+    const MASK: u16 = 0xb672; // cpsid i
+    const UNMASK: u16 = 0xb662; // cpsie i
+    const BRANCH: u16 = 0xe7ff; // b to the next instruction
+    const RETURN: u16 = 0x4770; // bx lr
+
+    #[test]
+    fn a_section_ends_at_the_first_instruction_that_unmasks() {
+        let graph = part_of(&[MASK, BRANCH, UNMASK, 0x2003, MASK, UNMASK, RETURN]).unwrap();
+        let instructions = graph.blocks.values().map(|it| it.instructions.len());
+        assert_eq!(instructions.sum::<usize>(), 3);
+    }
+
+    #[test]
+    fn a_section_that_does_not_end_or_masks_twice_is_refused() {
+        let left = part_of(&[MASK, BRANCH, RETURN]);
+        assert!(matches!(left, Err(BoundError::LeftMasked { .. })));
+        for nested in [
+            vec![MASK, MASK, UNMASK, UNMASK, RETURN],
+            vec![MASK, BRANCH, MASK, UNMASK, UNMASK, RETURN],
+        ] {
+            let nested = part_of(&nested);
+            assert!(matches!(nested, Err(BoundError::MaskedTwice { .. })));
+        }
+    }
 }
