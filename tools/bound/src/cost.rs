@@ -24,7 +24,7 @@ pub fn peripheral_accesses(block: &Block, chip: &Chip, values: &Values) -> Vec<u
     let mut accesses = Vec::new();
     for instruction in &block.instructions {
         if instruction.words().is_some()
-            && let Some(Value::Constant(address)) = address(instruction, &now)
+            && let Some(Value::Constant(address)) = address(instruction, &now, chip)
             && chip.is_peripheral(address)
         {
             accesses.push(instruction.address);
@@ -85,7 +85,7 @@ impl<'a> Walk<'a> {
             self.cycles += self.dividing;
             self.dividing = 0;
         }
-        let is_known = address(instruction, &self.values).is_some();
+        let is_known = address(instruction, &self.values, self.chip).is_some();
         let wait = if is_known || self.charges_unknown {
             wait(instruction, &self.values, self.chip)
         } else {

@@ -111,6 +111,14 @@ impl Chip {
         self.data.contains(&address)
     }
 
+    /// Returns whether a memory or a peripheral is at this address.
+    pub fn is_memory(&self, address: u32) -> bool {
+        self.is_data(address)
+            || self.program_in_ram.contains(&address)
+            || FLASH.contains(&address)
+            || self.is_peripheral(address)
+    }
+
     /// Returns whether a peripheral is at this address.
     pub fn is_peripheral(&self, address: u32) -> bool {
         PERIPHERALS.contains(&address)

@@ -89,7 +89,7 @@ pub fn follow(now: &mut Values, chip: &Chip, instruction: &Instruction) {
 pub fn wait(instruction: &Instruction, now: &Values, chip: &Chip) -> u32 {
     instruction.words().map_or(0, |words| {
         words
-            * match address(instruction, now) {
+            * match address(instruction, now, chip) {
                 Some(Value::Constant(address)) => chip.data_wait(address),
                 Some(Value::Data) => 0,
                 None if instruction.loads() => chip.program_wait(),
@@ -98,17 +98,20 @@ pub fn wait(instruction: &Instruction, now: &Values, chip: &Chip) -> u32 {
     })
 }
 
-/// Returns the address of an instruction's memory access, without an index.
-pub fn address(instruction: &Instruction, now: &Values) -> Option<Value> {
+/// Returns the address of an instruction's memory access, without an index. A constant that is no address of a memory may
+/// be the index.
+pub fn address(instruction: &Instruction, now: &Values, chip: &Chip) -> Option<Value> {
     let base = *instruction.address_from.first()?;
     if base == PROGRAM_COUNTER {
         return Some(Value::Constant(instruction.address));
     }
     let offset = instruction.memory.map_or(0, |(_, offset)| offset);
-    Some(match of(now, base)? {
-        Value::Constant(base) => Value::Constant(base.wrapping_add_signed(offset)),
-        Value::Data => Value::Data,
-    })
+    let is_indexed = instruction.address_from.len() > 1;
+    match of(now, base)? {
+        Value::Constant(base) if is_indexed && !chip.is_memory(base) => None,
+        Value::Constant(base) => Some(Value::Constant(base.wrapping_add_signed(offset))),
+        Value::Data => Some(Value::Data),
+    }
 }
 
 /// Returns the values at the start of every block, found by data flow from those at the entry.

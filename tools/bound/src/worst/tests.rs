@@ -215,6 +215,17 @@ fn a_load_is_one_from_the_program_unless_its_address_is_known() {
     assert_eq!(called(0x4630), called(0x4608) + 2);
 }
 
+/// A small constant in a register is an index, also where the instruction names it first.
+#[test]
+fn a_constant_that_is_no_address_does_not_show_where_a_load_is_from() {
+    // movs r0, #4; ldr r2, [r0, r6] (then r6, r0); bx lr
+    let [first, last] = [0x5982, 0x5832].map(|load| worst(&[0x2004, load, 0x4770], &[]));
+    assert_eq!(
+        first.unwrap().unwrap().cycles,
+        last.unwrap().unwrap().cycles
+    );
+}
+
 /// Flash: each line of four short instructions is waited for.
 #[test]
 fn every_line_of_the_flash_is_waited_for() {
