@@ -88,11 +88,11 @@ const PERIPHERALS: Range<u32> = 0x4000_0000..0xa000_0000;
 
 impl Chip {
     /// Returns the chip whose program contains this address.
-    pub fn of_program(address: u32) -> &'static Self {
+    pub fn of_program(address: u32) -> Option<&'static Self> {
         if F405.program_in_ram.contains(&address) {
-            &F405
+            Some(&F405)
         } else {
-            &G474
+            FLASH.contains(&address).then_some(&G474)
         }
     }
 
@@ -227,5 +227,19 @@ impl InstructionKind {
             Self::TableBranch | Self::FloatMultiplyAdd => 3,
             Self::FloatDivide | Self::Unknown => 1,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_program_shows_its_chip_by_where_it_begins() {
+        let chip = |start| Chip::of_program(start).map(|it| it.name);
+        assert_eq!(chip(0x0000_0400), Some("STM32F405"));
+        assert_eq!(chip(0x0800_0000), Some("STM32G474"));
+        // A program of Linux, and one of an STM32 in its RAM.
+        assert_eq!([0x0040_0000, 0x2000_0000].map(chip), [None; 2]);
     }
 }

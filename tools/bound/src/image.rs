@@ -77,9 +77,10 @@ impl Image {
         }
         let lines = addr2line::Loader::new(path).map_err(ImageError::Lines)?;
         let first = sections.iter().map(|(address, _)| *address).min();
+        let chip = first.and_then(Chip::of_program);
         Ok(Self {
             path: path.to_owned(),
-            chip: Chip::of_program(first.unwrap_or_default()),
+            chip: chip.ok_or(ImageError::UnknownChip)?,
             sections,
             functions,
             addresses,
@@ -98,10 +99,11 @@ impl Image {
     }
 
     /// Creates an image of one function's code, without an ELF file.
-    pub fn of_code(address: u32, code: &[u8], function: &str) -> Self {
+    #[cfg(test)]
+    pub(crate) fn of_code(address: u32, code: &[u8], function: &str) -> Self {
         Self {
             path: PathBuf::new(),
-            chip: Chip::of_program(address),
+            chip: Chip::of_program(address).unwrap(),
             sections: vec![(address, code.to_vec())],
             functions: BTreeMap::from([(address, function.to_owned())]),
             addresses: BTreeMap::from([(function.to_owned(), address)]),

@@ -123,6 +123,11 @@ pub enum ImageError {
     /// The source locations cannot be read.
     #[error("source locations: {0}")]
     Lines(Box<dyn std::error::Error>),
+    /// The program begins where that of no known chip does.
+    #[error(
+        "this is neither a program of the STM32F405, below 0x1c000, nor one of the STM32G474, from 0x08000000 on"
+    )]
+    UnknownChip,
     /// The image has no function of its own whose name contains this, or several.
     #[error("there is not exactly one function {0} with code of its own")]
     NotOneFunction(String),
