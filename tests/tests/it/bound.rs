@@ -70,7 +70,7 @@ fn a_tick_has_bounds_within_the_budget() {
     let proves = |of: fn(&Bound) -> u32| {
         let hz = bounds.each_ref().map(|bound| thousands(of(bound).into()));
         format!(
-            "with a tick they fit into its period up to {} Hz",
+            "with tick and longest section they fit periods up to {} Hz",
             hz.join(" and ")
         )
     };

@@ -77,7 +77,8 @@ pub struct Bound {
     pub longest_sensor_cycles: u32,
     /// Sections of other tasks that mask the control interrupt, the longest last.
     pub sections: Vec<Section>,
-    /// Highest control rate at which all interrupts of a tick end before the next one, Hz.
+    /// Highest control rate at which all interrupts of a tick end before the next one, Hz, even if the longest of `sections`
+    /// delays them. The serial port's interrupt, which has the update's priority and comes when the host sends, is left out.
     pub proves_hz: u32,
     /// The same with two sensors on each channel, Hz.
     pub proves_hz_with_both: u32,
@@ -230,8 +231,10 @@ impl Bound {
             longest_sensor_cycles = longest_sensor_cycles.max(last);
         }
         let [sensor_cycles, sensor_cycles_of_both] = sensor_cycles;
+        let sections = sections::of(image, &handlers)?;
+        let longest_section = sections.last().map_or(0, |it| it.cycles);
         let proves_hz = |sensor_cycles: u32| {
-            let all = tick_cycles + sensor_cycles;
+            let all = longest_section + tick_cycles + sensor_cycles;
             (chip.core_hz / f64::from(all)) as u32
         };
         Ok(Self {
@@ -239,7 +242,7 @@ impl Bound {
             sensor_cycles,
             sensor_cycles_of_both,
             longest_sensor_cycles,
-            sections: sections::of(image, &handlers)?,
+            sections,
             proves_hz: proves_hz(sensor_cycles),
             proves_hz_with_both: proves_hz(sensor_cycles_of_both),
             control,
@@ -290,7 +293,7 @@ impl Bound {
              is short.\n\
              Interrupts that read the sensors for the next tick, two on each channel: {} cycles, {:.1} µs in a tick, \
              {:.1} µs each at most.\n\
-             Together they prove control rates up to {} Hz.\n\
+             Together, and with the longest section below, they prove control rates up to {} Hz, without the serial port's interrupt.\n\
              With one sensor on each channel: {} cycles, {:.1} µs in a tick, and up to {} Hz.\n\
              Not a measurement: cycles by the documents of ARM and ST, every line read from flash a miss.\n\n\
              Sections of other tasks that mask the interrupts and may delay the control interrupt, the longest last:\n",
