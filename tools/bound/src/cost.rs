@@ -71,8 +71,8 @@ impl<'a> Walk<'a> {
         self.cycles + self.dividing
     }
 
-    /// Executes an instruction; `next` is the instruction executed after it, if known.
-    pub fn step(&mut self, instruction: &'a Instruction, next: Option<&Instruction>) {
+    /// Reads the lines of the flash that contain an instruction.
+    fn read(&mut self, instruction: &Instruction) {
         let last_byte = instruction.address + instruction.size - 1;
         for touched in [instruction.address, last_byte].map(|at| at / self.chip.flash_line_bytes) {
             if self.chip.is_in_flash(instruction.address) && self.line != Some(touched) {
@@ -81,6 +81,18 @@ impl<'a> Walk<'a> {
                 self.line = Some(touched);
             }
         }
+    }
+
+    /// Passes an instruction whose condition does not hold.
+    pub fn skip(&mut self, instruction: &Instruction) {
+        self.read(instruction);
+        self.pass(1);
+        self.before = None;
+    }
+
+    /// Executes an instruction; `next` is the instruction executed after it, if known.
+    pub fn step(&mut self, instruction: &'a Instruction, next: Option<&Instruction>) {
+        self.read(instruction);
         if instruction.uses_float() {
             self.cycles += self.dividing;
             self.dividing = 0;

@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use crate::BoundError;
 use crate::cost::Walk;
 use crate::image::Image;
-use crate::instruction::{Decoder, Instruction};
+use crate::instruction::{Decoder, Flow, Instruction};
 use crate::values::Values;
 use crate::worst::Loop;
 
@@ -44,18 +44,16 @@ impl<'a> Tracer<'a> {
     /// # Errors
     /// [`BoundError`] for an instruction of unknown cost.
     pub fn cost(&mut self, addresses: &[u32]) -> Result<Executed, BoundError> {
-        for address in addresses {
-            if !self.decoded.contains_key(address) {
-                let instruction = self.decoder.at(self.image, *address, false)?;
-                instruction.check()?;
-                self.decoded.insert(*address, instruction);
-            }
-        }
+        let path = self.path(addresses)?;
         let mut walk = Walk::from(self.image.chip, Values::new());
-        for (place, address) in addresses.iter().enumerate() {
+        for (place, (address, is_executed)) in path.iter().enumerate() {
             let instruction = &self.decoded[address];
-            let next = addresses.get(place + 1).map(|next| &self.decoded[next]);
-            walk.step(instruction, next);
+            let next = path.get(place + 1).map(|(next, _)| &self.decoded[next]);
+            if *is_executed {
+                walk.step(instruction, next);
+            } else {
+                walk.skip(instruction);
+            }
             if let Some(next) = next
                 && next.address != address + instruction.size
             {
@@ -63,10 +61,39 @@ impl<'a> Tracer<'a> {
             }
         }
         let handler = addresses.first().copied().unwrap_or_default();
+        let uses_float = addresses.iter().any(|it| self.decoded[it].uses_float());
         Ok(Executed {
-            cycles: walk.cycles() + self.image.chip.around(handler, true),
+            cycles: walk.cycles() + self.image.chip.around(handler, uses_float),
             instructions: addresses.len() as u32,
         })
+    }
+
+    /// Decodes executed instructions, and the conditional ones that have been passed between them. Returns the addresses of
+    /// all, and which have been executed.
+    fn path(&mut self, addresses: &[u32]) -> Result<Vec<(u32, bool)>, BoundError> {
+        let mut path = Vec::with_capacity(addresses.len());
+        for (place, address) in addresses.iter().enumerate() {
+            let (size, goes_on) = self.decode(*address)?;
+            path.push((*address, true));
+            let mut after = address + size;
+            let next = addresses.get(place + 1).copied().unwrap_or(after);
+            while goes_on && after < next {
+                path.push((after, false));
+                after += self.decode(after)?.0;
+            }
+        }
+        Ok(path)
+    }
+
+    /// Decodes an instruction; returns its size, and whether the next one is always that behind it.
+    fn decode(&mut self, address: u32) -> Result<(u32, bool), BoundError> {
+        if !self.decoded.contains_key(&address) {
+            let instruction = self.decoder.at(self.image, address, false)?;
+            instruction.check()?;
+            self.decoded.insert(address, instruction);
+        }
+        let instruction = &self.decoded[&address];
+        Ok((instruction.size, instruction.flow == Flow::Next))
     }
 }
 

@@ -5,6 +5,7 @@ use crate::cycles::{G474, PIPELINE_REFILL};
 use crate::image::Image;
 use crate::instruction::KEPT_BY_CALLS;
 use crate::loops::Declared;
+use crate::trace::Tracer;
 
 const AT: u32 = 0x0800_1000;
 const AT_IN_RAM: u32 = 0x0000_1000;
@@ -284,6 +285,22 @@ fn an_instruction_of_unknown_cost_is_refused() {
     // wfi
     let error = worst(&[0xbf30, 0x4770], &[]).unwrap_err();
     assert!(error.to_string().contains("wfi"), "{error}");
+}
+
+/// Whether its condition holds or not.
+#[test]
+fn an_executed_path_with_a_conditional_instruction_costs_no_more_than_the_worst() {
+    // cmp r0, #0; it ne; movne r0, #3; bx lr
+    let code = [0x2800, 0xbf18, 0x2003, 0x4770];
+    for at in [AT_IN_RAM, AT] {
+        let image = image(at, &code);
+        let worst = worst_at(at, &code, &[]).unwrap().unwrap();
+        let mut tracer = Tracer::new(&image).unwrap();
+        for executed in [vec![at, at + 2, at + 4, at + 6], vec![at, at + 2, at + 6]] {
+            let cycles = tracer.cost(&executed).unwrap().cycles;
+            assert_eq!(cycles, worst.cycles + image.chip.around(at, false));
+        }
+    }
 }
 
 #[test]
