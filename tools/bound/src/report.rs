@@ -91,7 +91,7 @@ pub struct Bound {
     /// Functions that such a tick does not call ([`STARTS`]).
     #[serde(skip)]
     pub not_called_at_start: BTreeSet<u32>,
-    /// Loops of the interrupts and of the functions that they call.
+    /// Loops of the interrupts, including those of the sensors, and of the functions that they call.
     #[serde(skip)]
     pub loops: Vec<Loop>,
     /// Addresses of all instructions, including those of the sensors' interrupts, that are charged with the wait for a
@@ -216,6 +216,11 @@ impl Bound {
                 .collect()
         };
         let mut peripheral_accesses = accesses(&analysis);
+        let loops = |analysis: &Analysis<'_>| -> Vec<Loop> {
+            let functions = analysis.functions();
+            functions.flat_map(|it| it.loops.iter().cloned()).collect()
+        };
+        let mut all_loops = loops(&analysis);
         let (mut sensor_cycles, mut longest_sensor_cycles) = ([0; 2], 0);
         for (bus, bus_hz) in SENSOR_BUSES.into_iter().zip(chip.bus_hz) {
             let limits = Limits::of_sensor_bus(chip, bus.timing, bus_hz);
@@ -225,6 +230,7 @@ impl Bound {
             let last = with_entry(&worst_of(bus.handler, &mut of_last_word)?);
             let other = with_entry(&worst_of(bus.handler, &mut of_word)?);
             peripheral_accesses.append(&mut accesses(&of_last_word));
+            all_loops.append(&mut loops(&of_last_word));
             for (sum, exchanges) in sensor_cycles.iter_mut().zip(bus.exchanges) {
                 *sum += (exchanges * bus.words - 1) * other + last;
             }
@@ -252,10 +258,7 @@ impl Bound {
             evaluates,
             not_called_at_start,
             peripheral_accesses,
-            loops: analysis
-                .functions()
-                .flat_map(|function| function.loops.iter().cloned())
-                .collect(),
+            loops: all_loops,
         })
     }
 

@@ -7,6 +7,7 @@ use crate::BoundError;
 use crate::cost::Walk;
 use crate::image::Image;
 use crate::instruction::{Decoder, Flow, Instruction};
+use crate::loops::Limit;
 use crate::values::Values;
 use crate::worst::Loop;
 
@@ -95,6 +96,29 @@ impl<'a> Tracer<'a> {
         let instruction = &self.decoded[&address];
         Ok((instruction.size, instruction.flow == Flow::Next))
     }
+}
+
+/// Returns executed instructions with the last round alone of each wait for hardware, and the cycles to which the bound limits
+/// these waits. The emulated clock is not that of the model: a wait has other rounds, but the same time.
+pub fn without_waits(loops: &[Loop], addresses: &[u32]) -> (Vec<u32>, u32) {
+    let (mut kept, mut waited, mut start) = (Vec::new(), 0, 0);
+    for address in addresses {
+        let mut begun = loops.iter().filter(|one| one.header == *address);
+        let wait = begun.find_map(|one| match one.limit {
+            Limit::Cycles(cycles) => Some((one, cycles)),
+            Limit::Times(_) => None,
+        });
+        if let Some((one, cycles)) = wait {
+            if kept.last().is_some_and(|before| one.contains(*before)) {
+                kept.truncate(start);
+            } else {
+                start = kept.len();
+                waited += cycles;
+            }
+        }
+        kept.push(*address);
+    }
+    (kept, waited)
 }
 
 /// Returns the largest number of iterations of a loop among all its entries in the executed

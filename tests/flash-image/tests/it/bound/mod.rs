@@ -11,8 +11,8 @@ use painleve_bound::profile::Profile;
 use painleve_bound::report::{
     Bound, CONTROL_INTERRUPT, HandlerBound, SENSOR_INTERRUPTS, UPDATE_INTERRUPT,
 };
-use painleve_bound::trace::{Executed, Tracer, rounds};
-use painleve_flash_image::bench::{Bench, BoardBench, encoded, scenario};
+use painleve_bound::trace::{Executed, Tracer, rounds, without_waits};
+use painleve_flash_image::bench::{Bench, BoardBench, encoded, scenario, with_one_sensor};
 use painleve_flash_image::board::{self, BoardChip, EmulatedBoard, F405, FlashedBoard, G474};
 use painleve_plant::scenario::{Scenario, built_in};
 use painleve_plant::simulation::Simulation;
@@ -253,6 +253,7 @@ fn ticks_of_the_nucleo_stay_below_the_bound() {
 
 fn ticks_with_sensors<C: BoardChip>() {
     with_bound::<C>(|watch| {
+        sensor_interrupts::<C>(watch.bound, &mut watch.tracer);
         let mut bench = Bench::<C>::new(&scenario("hybrid-elbow-down"));
         trace_ticks(&mut bench.board);
         bench.drive();
@@ -261,6 +262,40 @@ fn ticks_with_sensors<C: BoardChip>() {
             watch.look(&mut bench.board);
         }
     });
+}
+
+/// Compares the interrupts that read the sensors, one on each channel and two, with their bounds.
+fn sensor_interrupts<C: BoardChip>(bound: &Bound, tracer: &mut Tracer<'_>) {
+    for (scenario, most) in [
+        (with_one_sensor("hybrid-elbow-down"), bound.sensor_cycles),
+        (scenario("hybrid-elbow-down"), bound.sensor_cycles_of_both),
+    ] {
+        let mut bench = Bench::<C>::new(&scenario);
+        let handler = |name| bench.board.machine.symbol(name).unwrap();
+        let handlers = SENSOR_INTERRUPTS.map(handler);
+        bench.board.machine.trace(&handlers);
+        bench.drive();
+        bench.board.machine.take_traces();
+        let (mut longest, mut worst_tick, mut executions) = (0, 0, 0);
+        for _ in 0..50 {
+            bench.tick();
+            let traces = bench.board.machine.take_traces();
+            let cycles = traces.iter().map(|it| {
+                let (instructions, waited) = without_waits(&bound.loops, it);
+                tracer.cost(&instructions).unwrap().cycles + waited
+            });
+            let cycles: Vec<u32> = cycles.collect();
+            executions += cycles.len();
+            worst_tick = worst_tick.max(cycles.iter().sum());
+            longest = cycles.into_iter().fold(longest, u32::max);
+        }
+        println!(
+            "{executions} interrupts of sensors, worst {longest} cycles by the model, {worst_tick} in a tick; bound {} cycles, {most} in a tick",
+            bound.longest_sensor_cycles,
+        );
+        assert!(executions > 0);
+        assert!(longest <= bound.longest_sensor_cycles && worst_tick <= most);
+    }
 }
 
 /// Ports of the pins, on a bus that runs at the core's clock (RM0090, sections 2.1 and 8.1).
