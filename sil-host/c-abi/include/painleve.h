@@ -44,7 +44,9 @@ typedef struct {
   int32_t normal_force;
   // Tangential force, counts.
   int32_t tangential_force;
-  // Digital inputs; bit 0 enables the drive.
+  // Digital inputs. Bit 0, ENABLE: a rising edge, or a high level in the first frame, arms the drive; low takes the torque
+  // off. Bit 1, RESET: a rising edge clears a fault. Bits 2 to 5 are a board's: arming refused, stage not ready, gap
+  // against force, winding hot. Leave the others 0.
   uint32_t inputs;
 } PainleveSensorFrame;
 
@@ -60,11 +62,12 @@ typedef struct {
   int32_t reference_tip_um;
   // Estimated position of the tip along the belt, micrometres.
   int32_t estimated_tip_um;
-  // Number of the supervisor's state.
+  // State: 0 idle, 1 armed, 2 tracking, 3 lift-off, 4 fault. The torque stages are off in idle and fault.
   uint8_t state;
   // Number of the latched fault; 0 for none.
   uint8_t fault;
-  // Status flags.
+  // Flags. Bits: 0 contact, 1 torque saturated, 2 reference done, 4 reference held at the edge, 5 tip being returned to
+  // the belt, 6 slip is negative, 7 tip sticks.
   uint16_t flags;
 } PainleveActuatorFrame;
 
@@ -72,7 +75,7 @@ typedef struct {
 typedef struct {
   // Simulated time, s.
   double time_s;
-  // Angles from the downward vertical, rad.
+  // Angles of the links from the belt's inward normal, rad.
   double theta_rad[2];
   // Their rates, rad/s.
   double theta_dot_rad_s[2];

@@ -18,7 +18,9 @@ pub struct PainleveSensorFrame {
     pub normal_force: i32,
     /// Tangential force, counts.
     pub tangential_force: i32,
-    /// Digital inputs; bit 0 enables the drive.
+    /// Digital inputs. Bit 0, ENABLE: a rising edge, or a high level in the first frame, arms the drive; low takes the torque
+    /// off. Bit 1, RESET: a rising edge clears a fault. Bits 2 to 5 are a board's: arming refused, stage not ready, gap
+    /// against force, winding hot. Leave the others 0.
     pub inputs: u32,
 }
 
@@ -36,11 +38,12 @@ pub struct PainleveActuatorFrame {
     pub reference_tip_um: i32,
     /// Estimated position of the tip along the belt, micrometres.
     pub estimated_tip_um: i32,
-    /// Number of the supervisor's state.
+    /// State: 0 idle, 1 armed, 2 tracking, 3 lift-off, 4 fault. The torque stages are off in idle and fault.
     pub state: u8,
     /// Number of the latched fault; 0 for none.
     pub fault: u8,
-    /// Status flags.
+    /// Flags. Bits: 0 contact, 1 torque saturated, 2 reference done, 4 reference held at the edge, 5 tip being returned to
+    /// the belt, 6 slip is negative, 7 tip sticks.
     pub flags: u16,
 }
 
@@ -50,7 +53,7 @@ pub struct PainleveActuatorFrame {
 pub struct PainleveSnapshot {
     /// Simulated time, s.
     pub time_s: f64,
-    /// Angles from the downward vertical, rad.
+    /// Angles of the links from the belt's inward normal, rad.
     pub theta_rad: [f64; 2],
     /// Their rates, rad/s.
     pub theta_dot_rad_s: [f64; 2],
