@@ -1,4 +1,8 @@
-/* The controller holds the simulated arm on its belt, from C. */
+/* The controller holds the simulated arm on its belt, from C.
+
+       cargo build --release --package painleve-c-abi
+       cc -std=c99 examples/c/closed_loop.c -I sil-host/c-abi/include -L target/release \
+           -Wl,-rpath,$PWD/target/release -lpainleve_c -lm -o closed_loop && ./closed_loop */
 #include <math.h>
 #include <stdio.h>
 

@@ -1,9 +1,9 @@
-// A user-defined controller in C++: holds both joints of the simulated arm at their initial angles and presses
-// the tip on the belt. The plant, its encoders and its torque stages come from the C library.
-//
-//     cargo build --release --package painleve-c-abi
-//     g++ -std=c++17 examples/cpp/own_controller.cpp -I sil-host/c-abi/include
-//         -L target/release -Wl,-rpath,$PWD/target/release -lpainleve_c -o own_controller && ./own_controller
+/* A user-defined controller in C++: holds both joints of the simulated arm at their initial angles and presses
+   the tip on the belt. The plant, its encoders and its torque stages come from the C library.
+
+       cargo build --release --package painleve-c-abi
+       g++ -std=c++17 examples/cpp/own_controller.cpp -I sil-host/c-abi/include -L target/release \
+           -Wl,-rpath,$PWD/target/release -lpainleve_c -o own_controller && ./own_controller */
 #include <algorithm>
 #include <array>
 #include <cmath>
