@@ -6,7 +6,7 @@ The arm of the default scenario presses its tip on a moving belt and follows a r
 the contact equations lose their solution. The controller holds the tip before that place. Arm and normal contact are
 MuJoCo's. The friction is not: MuJoCo's model of friction is convex, so that a sliding contact also pushes the tip off
 the belt, by the friction times the slip. Coulomb's friction is therefore applied as a force, from the normal force of the
-step before.
+step before: this diverges in postures with p > 2 Q22, however small the step (benches/others/mujoco_arm.py).
 """
 
 import ctypes
