@@ -1,6 +1,6 @@
 """The arm as a Gymnasium environment: torques in, angles and tip out; the reward follows the reference.
 
-Needs `pip install painleve[gym]`.
+Needs the package's extra `gym`: Gymnasium and NumPy.
 """
 
 import math

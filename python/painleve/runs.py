@@ -1,6 +1,6 @@
 """Many runs, and what they show: sweeps, differences, figures, margins.
 
-`sweep`, `compare` and `plot` need what `pip install painleve[plot]` installs: pandas and Matplotlib.
+`sweep`, `compare` and `plot` need the package's extra `plot`: pandas, Matplotlib and NumPy.
 """
 
 import itertools
