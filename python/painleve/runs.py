@@ -58,7 +58,8 @@ def sweep(
     measure: Callable[[Run], Mapping[str, Any]] = outcome,
 ):
     """Runs a scenario with all combinations of values of its keys, and returns a DataFrame with a line for each: the
-    values, and what `measure` returns for the run. The last key varies fastest; runs share the cores."""
+    values, and what `measure` returns for the run. The last key varies fastest; runs share the cores. Ctrl-C ends it when
+    the runs that have begun are done."""
     import pandas
 
     names = list(keys)
