@@ -26,10 +26,11 @@ mod values;
 
 use interruptible::{Interruptible, exception};
 
-/// Loads a scenario by name or as TOML text, with overrides.
+/// Loads a scenario by name, by a path, which ends in `.toml`, or as TOML text, with overrides.
 fn load(scenario: &str, overrides: Option<&Bound<'_, PyDict>>) -> PyResult<Scenario> {
     let overrides = overrides.map_or(Ok(Vec::new()), values::overrides)?;
-    let loaded = if scenario.contains(['=', '\n']) {
+    let is_path = scenario.ends_with(".toml") && !scenario.contains('\n');
+    let loaded = if scenario.is_empty() || !is_path && scenario.contains(['=', '\n']) {
         Scenario::from_toml(scenario)
             .and_then(|scenario| scenario.with_overrides("scenario", &overrides))
     } else {

@@ -21,6 +21,15 @@ def test_overrides_and_mistakes():
         painleve.run("egde")
 
 
+def test_a_scenario_is_a_name_a_path_or_a_text(tmp_path):
+    text = "belt.friction = 0.5\nrun.duration_s = 0.1\n"
+    path = tmp_path / "friction=0.5.toml"
+    path.write_text(text)
+    assert str(painleve.run(str(path))) == str(painleve.run(text))
+    defaults = painleve.Plant("").state()
+    assert defaults == painleve.Plant("\n").state() != painleve.Plant("open-loop-bounce").state()
+
+
 def test_the_package_has_the_names_that_it_lists():
     modules = {"gym", "runs", "_painleve"}
     assert {name for name in dir(painleve) if not name.startswith("__")} - modules == set(painleve.__all__)
