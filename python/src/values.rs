@@ -30,10 +30,17 @@ pub fn arguments(options: &Bound<'_, PyDict>) -> PyResult<Vec<String>> {
     let mut arguments = Vec::new();
     for (name, value) in options {
         let name: String = name.extract()?;
+        if name == "help" {
+            return Err(PyValueError::new_err("help is no option of a study"));
+        }
         let option = format!("--{}", name.replace('_', "-"));
         match toml_value(&name, &value, 0)? {
             Value::Boolean(true) => arguments.push(option),
             Value::Boolean(false) => {}
+            Value::Array(items) if name == "set" => {
+                let repeated = |item| format!("{option}={}", text(item));
+                arguments.extend(items.iter().map(repeated));
+            }
             Value::Array(items) => {
                 let items: Vec<String> = items.iter().map(text).collect();
                 arguments.push(format!("{option}={}", items.join(",")));

@@ -149,6 +149,8 @@ def test_a_study_gives_the_object_of_the_command():
     assert abs(admissible["elbow_down"]["intervals_m"][0][1] - 0.164705) < 1e-6
     heavier = painleve.study("admissible", mu=0.6, set={"arm.tip_mass_kg": 0.01})
     assert heavier["elbow_down"] != admissible["elbow_down"]
+    both = ["arm.tip_mass_kg=0.02", "arm.tip_mass_kg=0.01"]
+    assert painleve.study("admissible", mu=0.6, set=both) == heavier
     section = painleve.study(
         "bifurcation", mu=0.6, v_belt=[-0.5, -0.4], initial=["a", "d"], transient_s=1, record_s=1
     )
@@ -171,6 +173,7 @@ def test_a_study_takes_arrays_and_tuples():
         ("bifurcation", {"mu": -1}, "^mu = -1"),
         ("admissible", {"nu": 0.6}, "'nu"),
         ("bifurcation", {"v_blt": 0.6}, "'v_blt"),
+        ("admissible", {"help": True}, "^help is no option"),
         ("bifurcation", {"mu": "slippery"}, "mu"),
         ("admissible", {"set": {"belt.frction": 1}}, "^belt.frction: unknown key"),
         ("admissible", {"set": {"belt.friction": 1}}, "^belt.friction has no effect here; use mu$"),
