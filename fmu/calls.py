@@ -178,6 +178,21 @@ def check_variables(fmu):
             instance = fmu.in_state("Instantiated")
             fmu.refused(part, instance, way + kind, *arguments)
             fmu.library.fmi3FreeInstance(instance)
+    # A call that is refused for its last variable has not set the others.
+    friction = fmu.variables["belt.friction"].valueReference
+    for bad in (99, 0, fmu.variables["settings"].valueReference, fmu.variables["theta1_rad"].valueReference):
+        instance = fmu.in_state("Instantiated")
+        before = fmu.get(instance, "belt.friction")
+        references, values = (c_uint32 * 2)(friction, bad), (c_double * 2)(0.25, 0.25)
+        fmu.refused(f"value reference {bad}", instance, "SetFloat64", references, 2, values, 2)
+        assert fmu.get(instance, "belt.friction") == before
+        fmu.library.fmi3FreeInstance(instance)
+    settings = fmu.variables["settings"].valueReference
+    instance = fmu.in_state("Instantiated")
+    texts = (c_char_p * 2)(b"run.seed=3", None)
+    fmu.refused("a text is null", instance, "SetString", (c_uint32 * 2)(settings, settings), 2, texts, 2)
+    assert fmu.get(instance, "settings") == (OK, b"")
+    fmu.library.fmi3FreeInstance(instance)
     for part, value in [("a text is null", None), ("a text is not UTF-8", b"\xff")]:
         instance = fmu.in_state("Instantiated")
         fmu.refused(part, instance, "SetString", byref(c_uint32(1)), 1, (c_char_p * 1)(value), 1)

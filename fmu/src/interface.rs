@@ -457,8 +457,16 @@ macro_rules! numbers {
                 let (references, values) =
                     unsafe { (array(references, n_references)?, array(values, n_values)?) };
                 same_length(references.len(), values.len())?;
-                for (&reference, value) in references.iter().zip(values) {
+                for &reference in references {
                     instance.check_settable(reference)?;
+                    // Only a variable of this type can be read as one.
+                    let mut present = [Default::default()];
+                    instance
+                        .arm
+                        .$read(reference - 1, &mut present, &instance.context)
+                        .map_err(|_| no_such_variable(reference))?;
+                }
+                for (&reference, value) in references.iter().zip(values) {
                     let value = std::slice::from_ref(value);
                     instance
                         .arm
@@ -532,13 +540,21 @@ unsafe extern "C" fn fmi3SetString(
         let (references, values) =
             unsafe { (array(references, n_references)?, array(values, n_values)?) };
         same_length(references.len(), values.len())?;
+        let mut texts = Vec::new();
         for (&reference, &value) in references.iter().zip(values) {
             instance.check_settable(reference)?;
-            // SAFETY: null or a C string, by the standard.
-            let value = [CString::new(unsafe { text(value, "a text") }?)?];
+            let mut present = [CString::default()];
             instance
                 .arm
-                .set_string(reference - 1, &value, &instance.context)
+                .get_string(reference - 1, &mut present, &instance.context)
+                .map_err(|_| no_such_variable(reference))?;
+            // SAFETY: null or a C string, by the standard.
+            texts.push(CString::new(unsafe { text(value, "a text") }?)?);
+        }
+        for (&reference, value) in references.iter().zip(texts) {
+            instance
+                .arm
+                .set_string(reference - 1, &[value], &instance.context)
                 .map_err(|_| no_such_variable(reference))?;
         }
         Ok(())
