@@ -220,7 +220,7 @@ mod tests {
             desk.send(ViewerRequest::Reset).unwrap();
         }
         let refusal = desk.send(ViewerRequest::Reset).unwrap_err();
-        assert!(refusal.contains("64 orders"), "{refusal}");
+        assert!(refusal.contains("64 requests"), "{refusal}");
         assert_eq!(desk.request(ViewerRequest::Reset), Err(refusal));
     }
 

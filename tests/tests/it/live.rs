@@ -75,7 +75,7 @@ fn a_flood_of_orders_is_refused_once_and_ctrl_c_is_obeyed_at_once() {
     let start = Instant::now();
     while start.elapsed() < Duration::from_millis(500) {
         match viewer.0.read().unwrap() {
-            Message::Text(text) => refusals += u32::from(text.contains("100 orders")),
+            Message::Text(text) => refusals += u32::from(text.contains("100 requests")),
             _ => rows += 1,
         }
     }

@@ -20,8 +20,8 @@ crate::on_each_board! {
     switch_sensors_stages_and_host_take_the_torque_off_as_with_a_law,
 }
 
-/// 1 N·m of 5 N·m in 12 bits.
-const LIMIT_COUNTS: i32 = 410;
+/// 1 N·m of 5 N·m in 12 bits, rounded down.
+const LIMIT_COUNTS: i32 = 409;
 
 /// Commissioning reads one sensor of each channel at a time. The windings become hot within a fifth of a second.
 fn limited() -> Scenario {
