@@ -32,8 +32,8 @@ PANELS = (
 
 
 def outcome(columns: Run) -> dict[str, float]:
-    """Returns what became of a run: lift-offs, fault (0 for none), tip and tracking error at the end, RMS error, largest
-    torque."""
+    """Returns what became of a run: lift-offs that last until a tick, fault (0 for none), tip and tracking error at the end,
+    RMS error, largest torque."""
     errors = [
         tip - reference
         for tip, reference in zip(columns["plant.tip_t_m"], columns["plant.reference_tip_t_m"])

@@ -73,25 +73,32 @@ pub fn run(arguments: &TestArguments) -> Result<(), ChoreError> {
         .iter()
         .map(|tool| format!("tests that use {tool}: it cannot be installed"))
         .collect();
-    let mut failed = Vec::new();
-    let mut keep = |name: &str, outcome: Result<(), ChoreError>| {
-        if let Err(error) = outcome {
+    let (mut took, mut failed) = (Vec::new(), Vec::new());
+    let mut keep = |name: &'static str, step: &mut dyn FnMut() -> Result<(), ChoreError>| {
+        let start = Instant::now();
+        if let Err(error) = step() {
             failed.push(format!("{name}: {error}"));
         }
+        took.push((start.elapsed(), name));
     };
-    let skipped = workspace_tests(arguments).map(|skipped| left_out.extend(skipped));
-    keep("tests of the workspace", skipped);
+    keep("tests of the workspace", &mut || {
+        left_out.extend(workspace_tests(arguments)?);
+        Ok(())
+    });
     if arguments.all {
-        for (name, step) in FURTHER_STEPS {
-            keep(name, step());
+        for (name, mut step) in FURTHER_STEPS {
+            keep(name, &mut step);
         }
     } else {
-        keep("chaos", chaos::short());
+        keep("chaos", &mut chaos::short);
         let further: Vec<&str> = FURTHER_STEPS.iter().map(|(name, _)| *name).collect();
         left_out.push(format!(
             "left to `cargo xtask test --all`: tests marked #[ignore], {}",
             further.join(", ")
         ));
+    }
+    for (time, name) in took {
+        say(&format!("{:>6.0} s  {name}", time.as_secs_f64()))?;
     }
     for reason in &left_out {
         say(&format!("not run: {reason}"))?;
