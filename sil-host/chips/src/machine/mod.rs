@@ -91,6 +91,8 @@ pub enum Reset {
     BrownOut,
     /// The independent watchdog was not fed.
     Watchdog,
+    /// The window watchdog was not fed.
+    WindowWatchdog,
     /// The program requested it.
     Software,
     /// The reset pin was low.

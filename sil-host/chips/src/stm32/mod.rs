@@ -14,7 +14,7 @@ pub use flash::{FlashSlots, Power};
 pub use gpio::{Gpio, GpioReset};
 pub use timer::Timer;
 pub use usart::{Usart, UsartLayout};
-pub use watchdog::{Watchdog, WindowWatchdog};
+pub use watchdog::{Watchdog, WindowWatchdog, expired};
 
 use crate::Transfer;
 

@@ -3,6 +3,7 @@
 //!
 //! Where the manuals leave a time open, it is the longest, or depends on a phase that tests draw.
 
+use crate::machine::Reset;
 use crate::{Picoseconds, SECOND};
 
 /// Longest time until a new limit of the independent watchdog takes effect, cycles of its oscillator.
@@ -105,16 +106,18 @@ impl Watchdog {
         let cycle = SECOND / self.oscillator_hz;
         let from = now + UPDATE_CYCLES * cycle - self.phase % cycle;
         match (offset, value) {
-            (0x00, 0x5555) => self.is_open = true,
-            (0x00, 0xcccc) => {
-                self.expires = now;
-                self.feed(now);
+            (0x00, key) => {
+                self.is_open = key == 0x5555;
+                match key {
+                    // The manuals do not say that this key feeds a watchdog that already runs.
+                    0xcccc if self.expires == Picoseconds::MAX => {
+                        self.expires = now;
+                        self.feed(now);
+                    }
+                    0xaaaa => self.feed(now),
+                    _ => {}
+                }
             }
-            (0x00, 0xaaaa) => {
-                self.is_open = false;
-                self.feed(now);
-            }
-            (0x00, _) => self.is_open = false,
             (0x04, _) if self.is_open => {
                 self.prescaler.set(value & 7, from, now);
                 self.expires = self.at_the_new_pace(self.expires);
@@ -246,4 +249,14 @@ impl WindowWatchdog {
         let expires = self.expires.filter(|_| self.slowness > 0);
         expires.unwrap_or(Picoseconds::MAX)
     }
+}
+
+/// Returns the reset of the watchdog that has expired, the first one if both have.
+pub fn expired(own: &Watchdog, window: &WindowWatchdog, now: Picoseconds) -> Option<Reset> {
+    let resets = [
+        (own.expires(), Reset::Watchdog),
+        (window.expires(), Reset::WindowWatchdog),
+    ];
+    let (at, reset) = resets.into_iter().min_by_key(|(at, _)| *at)?;
+    (at <= now).then_some(reset)
 }

@@ -13,7 +13,7 @@ use crate::machine::{Chip, Reset};
 use crate::stm32::{
     Adc, AdcLayout, Crystal, Dac, FlashSlots, Gpio, GpioReset, Individual, Outside, Pin, PinLevel,
     PinMode, Power, Timer, Usart, UsartLayout, Watchdog, WindowWatchdog, WiredChip, carry,
-    check_function, check_spi_pins, store_port,
+    check_function, check_spi_pins, expired, store_port,
 };
 use crate::unicorn::Processor;
 use crate::{MICROSECOND, MILLISECOND, Picoseconds};
@@ -46,7 +46,8 @@ const WRITE_PROTECTED: u32 = 1 << 4;
 /// Stores of four bytes.
 const WORDS: u32 = 2 << 8;
 
-/// Bit of the option bytes' register that starts their programming.
+/// Bits of the option bytes' register: it is locked, and their programming starts.
+const OPTION_LOCK: u32 = 1;
 const OPTION_START: u32 = 2;
 
 /// Option bytes of a new chip, and those with the highest brown-out level.
@@ -98,6 +99,10 @@ pub struct Stm32f4<O> {
     slots: FlashSlots,
     /// Errors in the flash's status register.
     flash_errors: u32,
+    /// Option bytes as programmed, and those that the last reset has loaded, which count. Their register gives what was
+    /// written to it.
+    programmed_options: u32,
+    loaded_options: u32,
     /// Time until which the option bytes are programmed.
     options_busy_until: Picoseconds,
     /// Number of keys that have opened the flash's control register.
@@ -132,6 +137,8 @@ impl<O: Outside> Stm32f4<O> {
             flash_control: [0, 0, 0, 0, LOCK, USUAL_OPTIONS, 0, 0],
             slots: FlashSlots::new(Self::SLOTS.1),
             flash_errors: 0,
+            programmed_options: USUAL_OPTIONS,
+            loaded_options: USUAL_OPTIONS,
             options_busy_until: 0,
             keys: 0,
             syscfg: [0; 16],
@@ -292,11 +299,14 @@ impl<O: Outside> Stm32f4<O> {
                 }
             }
             (0x08, 0x0819_2a3b) => self.flash_control[2] = 1,
-            (0x08, 0x4c5d_6e7f) if self.flash_control[2] == 1 => self.flash_control[5] &= !1,
-            (0x14, _) if self.flash_control[5] & 1 == 0 => {
+            (0x08, 0x4c5d_6e7f) if self.flash_control[2] == 1 => {
+                self.flash_control[5] &= !OPTION_LOCK;
+            }
+            (0x14, _) if self.flash_control[5] & OPTION_LOCK == 0 => {
                 assert!(!self.flash_is_busy(now), "the flash is busy");
                 self.flash_control[5] = value & !OPTION_START;
                 if value & OPTION_START != 0 {
+                    self.programmed_options = self.flash_control[5];
                     self.options_busy_until = now + OPTION_TIME;
                 }
             }
@@ -317,9 +327,15 @@ impl<O> Stm32f4<O> {
         carry(&mut self.ports, &mut self.timer, wired, hz, now);
     }
 
+    /// Loads the option bytes, as every reset does.
+    fn load_options(&mut self) {
+        self.loaded_options = self.programmed_options;
+        self.flash_control[5] = self.programmed_options | OPTION_LOCK;
+    }
+
     /// Notes an error if the option bytes protect a slot.
     fn is_write_protected(&mut self, slot: u32) -> bool {
-        let is_protected = self.flash_control[5] >> (16 + FIRST_SECTOR + slot) & 1 == 0;
+        let is_protected = self.loaded_options >> (16 + FIRST_SECTOR + slot) & 1 == 0;
         self.flash_errors |= u32::from(is_protected) * WRITE_PROTECTED;
         is_protected
     }
@@ -380,7 +396,7 @@ impl<O: Outside> Chip for Stm32f4<O> {
         self.keys = 0;
         self.flash_errors = 0;
         self.slots.reset(now);
-        self.flash_control[5] |= 1;
+        self.load_options();
         self.syscfg = [0; 16];
         self.external_interrupts = [0; 8];
         self.reset = None;
@@ -447,9 +463,8 @@ impl<O: Outside> Chip for Stm32f4<O> {
                 break;
             }
         }
-        if self.watchdog.expires().min(self.window_watchdog.expires()) <= now {
-            self.reset = Some(Reset::Watchdog);
-        }
+        let expired = expired(&self.watchdog, &self.window_watchdog, now);
+        self.reset = expired.or(self.reset);
     }
 
     fn next_event(&self) -> Picoseconds {
@@ -542,7 +557,7 @@ impl<O: Outside> WiredChip for Stm32f4<O> {
     fn set_supply(&mut self, millivolts: u32) {
         let was_low = self.supply_is_low();
         self.supply_mv = millivolts;
-        let level = self.flash_control[5] >> 2 & 3;
+        let level = self.loaded_options >> 2 & 3;
         let threshold = [2700, 2400, 2100, 1800][level as usize];
         if millivolts < threshold {
             self.reset = Some(Reset::BrownOut);
@@ -564,7 +579,8 @@ impl<O: Outside> WiredChip for Stm32f4<O> {
     }
 
     fn set_new_options(&mut self) {
-        self.flash_control[5] = NEW_OPTIONS;
+        self.programmed_options = NEW_OPTIONS;
+        self.load_options();
     }
 
     fn set_crystal(&mut self, failure: Crystal) {
@@ -591,7 +607,8 @@ impl<O: Outside> WiredChip for Stm32f4<O> {
     }
 
     fn flip_options(&mut self, bits: u32) {
-        self.flash_control[5] ^= bits;
+        self.programmed_options ^= bits;
+        self.load_options();
     }
 
     fn usart(&self) -> &Usart {

@@ -64,6 +64,7 @@ impl Rcc {
             Reset::Power => 0x0e00_0000,
             Reset::BrownOut => 0x0600_0000,
             Reset::Watchdog => 0x2400_0000,
+            Reset::WindowWatchdog => 0x4400_0000,
             Reset::Software => 0x1400_0000,
             Reset::Pin => 0x0400_0000,
         };

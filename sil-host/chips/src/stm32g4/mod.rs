@@ -15,7 +15,7 @@ use crate::machine::{Chip, Reset};
 use crate::stm32::{
     Adc, AdcLayout, Crystal, Dac, FlashSlots, Gpio, GpioReset, Individual, Outside, Pin, PinLevel,
     PinMode, Power, Timer, Usart, UsartLayout, Watchdog, WindowWatchdog, WiredChip, carry,
-    check_function, check_spi_pins, store_port,
+    check_function, check_spi_pins, expired, store_port,
 };
 use crate::unicorn::Processor;
 
@@ -328,9 +328,8 @@ impl<O: Outside> Chip for Stm32g4<O> {
                 break;
             }
         }
-        if self.watchdog.expires().min(self.window_watchdog.expires()) <= now {
-            self.reset = Some(Reset::Watchdog);
-        }
+        let expired = expired(&self.watchdog, &self.window_watchdog, now);
+        self.reset = expired.or(self.reset);
     }
 
     fn next_event(&self) -> Picoseconds {

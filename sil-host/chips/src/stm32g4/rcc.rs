@@ -83,6 +83,7 @@ impl Rcc {
         let reason = match reset {
             Reset::Power | Reset::BrownOut => 0x0c00_0000,
             Reset::Watchdog => 0x2400_0000,
+            Reset::WindowWatchdog => 0x4400_0000,
             Reset::Software => 0x1400_0000,
             Reset::Pin => 0x0400_0000,
         };

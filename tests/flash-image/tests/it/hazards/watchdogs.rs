@@ -81,7 +81,7 @@ fn watches_over<C: BoardChip>(tick_hz: u32) {
         bench.board.machine.run_for(2 * SECOND / u64::from(tick_hz));
         assert_eq!(
             bench.board.resets(),
-            [Reset::Watchdog],
+            [Reset::WindowWatchdog],
             "{tick_hz} Hz, phase {phase}"
         );
         assert_ne!(bench.board.torque().enabled, Some(true));
