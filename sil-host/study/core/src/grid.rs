@@ -2,6 +2,8 @@
 
 use std::str::FromStr;
 
+use crate::options::once;
+
 /// Largest number of values in a grid.
 const MOST_VALUES: f64 = 1e6;
 
@@ -143,7 +145,9 @@ impl FromStr for Grid {
                 text: text.into(),
                 parts: parts.len(),
             }),
-            _ => Ok(Self { values }),
+            _ => Ok(Self {
+                values: once(&values),
+            }),
         }
     }
 }

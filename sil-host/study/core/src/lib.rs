@@ -42,13 +42,13 @@ pub enum StudyError {
     /// The text of a grid is invalid.
     #[error(transparent)]
     Grid(#[from] GridError),
-    /// An override sets a key that an option of the study sets.
-    #[error("{key} has no effect here; use {option}")]
+    /// An override sets a key that the study sets or does not use, or an option names what it cannot compute.
+    #[error("{key} has no effect here; {instead}")]
     Taken {
-        /// The key.
+        /// The key or option.
         key: String,
-        /// The option.
-        option: String,
+        /// What to do instead, or what sets the key.
+        instead: String,
     },
     /// The scenario has something that the study does not compute.
     #[error(

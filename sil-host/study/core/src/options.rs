@@ -31,16 +31,29 @@ pub struct BaseOptions {
 
 impl BaseOptions {
     /// Returns the scenario with its numbers checked, but not its initial state. `taken` lists
-    /// the keys that the study's own options set, with the option of each.
+    /// the keys that the study's own options set, with the option of each; `used` the tables that the study uses.
     ///
     /// # Errors
-    /// [`StudyError`] if the scenario is invalid, if it sets a key in `taken`, or if it has an effect: studies that start
-    /// from it alone compute the arm without.
-    pub fn load(&self, taken: &[(&str, &str)]) -> Result<Scenario, StudyError> {
+    /// [`StudyError`] if the scenario is invalid, if an override sets a key in `taken` or outside the tables in `used`, or
+    /// if the scenario has an effect: studies that start from it alone compute the arm without.
+    pub fn load(&self, taken: &[(&str, &str)], used: &[&str]) -> Result<Scenario, StudyError> {
         self.overrides.refuse(taken)?;
         let scenario = Scenario::load_unplaced(&self.scenario, &self.overrides.overrides)?;
-        match scenario.effects.first_on(&scenario.arm) {
-            Some(key) => Err(self.ignored(key)),
+        if let Some(key) = scenario.effects.first_on(&scenario.arm) {
+            return Err(self.ignored(key));
+        }
+        let keys = self.overrides.overrides.iter();
+        let mut keys = keys.filter_map(|text| Some(text.split_once('=')?.0.trim()));
+        let is_unused = |key: &&str| {
+            !used
+                .iter()
+                .any(|table| key.split('.').next() == Some(table))
+        };
+        match keys.find(is_unused) {
+            Some(key) => Err(StudyError::Taken {
+                key: key.to_owned(),
+                instead: format!("set keys of {}", used.join(", ")),
+            }),
             None => Ok(scenario),
         }
     }
@@ -49,8 +62,12 @@ impl BaseOptions {
     ///
     /// # Errors
     /// As [`load`](Self::load), and [`StudyError::Ignored`] if the contact is compliant.
-    pub fn load_rigid(&self, taken: &[(&str, &str)]) -> Result<Scenario, StudyError> {
-        let scenario = self.load(taken)?;
+    pub fn load_rigid(
+        &self,
+        taken: &[(&str, &str)],
+        used: &[&str],
+    ) -> Result<Scenario, StudyError> {
+        let scenario = self.load(taken, used)?;
         match scenario.contact.kind {
             ContactKind::Rigid => Ok(scenario),
             ContactKind::Compliant => Err(self.ignored("contact.kind = \"compliant\"")),
@@ -79,19 +96,28 @@ impl Overrides {
     /// # Errors
     /// [`StudyError::Taken`] naming the option to use instead.
     pub fn refuse(&self, taken: &[(&str, &str)]) -> Result<(), StudyError> {
-        let pairs = self
-            .overrides
-            .iter()
-            .flat_map(|text| taken.iter().map(move |taken| (text, taken)));
-        for (text, (taken, option)) in pairs {
-            if let Some(key) = scenario::sets(text, taken) {
-                return Err(StudyError::Taken {
-                    key: key.to_owned(),
-                    option: (*option).to_owned(),
-                });
-            }
+        let mut taken = taken.iter();
+        taken.try_for_each(|(key, option)| self.refuse_key(key, &format!("use {option}")))
+    }
+
+    /// Rejects overrides of keys that the study sets in every run.
+    ///
+    /// # Errors
+    /// [`StudyError::Taken`] naming the key.
+    pub fn refuse_fixed(&self, keys: &[&str]) -> Result<(), StudyError> {
+        let mut keys = keys.iter();
+        keys.try_for_each(|key| self.refuse_key(key, "the study sets it"))
+    }
+
+    fn refuse_key(&self, taken: &str, instead: &str) -> Result<(), StudyError> {
+        let mut overrides = self.overrides.iter();
+        match overrides.find_map(|text| scenario::sets(text, taken)) {
+            Some(key) => Err(StudyError::Taken {
+                key: key.to_owned(),
+                instead: instead.to_owned(),
+            }),
+            None => Ok(()),
         }
-        Ok(())
     }
 }
 
@@ -109,14 +135,15 @@ pub struct RandomRuns {
         value_parser = runs
     )]
     pub runs: usize,
+    /// Changes to every drawn scenario.
     #[command(flatten)]
-    overrides: Overrides,
+    pub set: Overrides,
 }
 
 impl RandomRuns {
     /// Returns the changes to every drawn scenario.
     pub fn overrides(&self) -> Vec<String> {
-        self.overrides.overrides.clone()
+        self.set.overrides.clone()
     }
 }
 
@@ -224,6 +251,17 @@ impl From<PostureOption> for Posture {
     }
 }
 
+/// Returns the values of a list on the command line in their order, each once.
+pub fn once<T: Clone + PartialEq>(values: &[T]) -> Vec<T> {
+    let mut once: Vec<T> = Vec::new();
+    for value in values {
+        if !once.contains(value) {
+            once.push(value.clone());
+        }
+    }
+    once
+}
+
 /// A length on the command line.
 ///
 /// # Errors
@@ -294,13 +332,18 @@ mod tests {
 
     #[test]
     fn a_table_around_a_taken_key_is_refused_if_it_sets_the_key() {
-        let load = |text| options(&[text]).load(&[("belt.friction", "--mu")]);
+        let load = |text| options(&[text]).load(&[("belt.friction", "--mu")], &["belt"]);
         for text in ["belt.friction=0.9", "belt={friction=0.9}"] {
             let message = load(text).unwrap_err().to_string();
             assert_eq!(message, "belt.friction has no effect here; use --mu");
         }
         let other = load("belt={profile={kind='constant',speed_m_s=-0.7}}").unwrap();
         assert_eq!(other.belt.profile.speed_m_s(0.0), -0.7);
+    }
+
+    #[test]
+    fn what_is_given_twice_is_there_once() {
+        assert_eq!(once(&[3, 1, 3]), [3, 1]);
     }
 
     #[test]
@@ -316,16 +359,22 @@ mod tests {
                 "arm.coulomb_friction_nm",
             ),
         ] {
-            let message = options(overrides).load(&[]).unwrap_err().to_string();
+            let message = options(overrides)
+                .load(&[], &["contact"])
+                .unwrap_err()
+                .to_string();
             assert!(
                 message.starts_with("scenario open-loop-bounce: "),
                 "{message}"
             );
             assert!(message.contains(named), "{message}");
         }
-        assert!(options(&[soft]).load(&[]).is_ok());
-        assert!(options(&[]).load_rigid(&[]).is_ok());
-        let message = options(&[soft]).load_rigid(&[]).unwrap_err().to_string();
+        assert!(options(&[soft]).load(&[], &["contact"]).is_ok());
+        assert!(options(&[]).load_rigid(&[], &[]).is_ok());
+        let message = options(&[soft])
+            .load_rigid(&[], &["contact"])
+            .unwrap_err()
+            .to_string();
         assert!(
             message.contains("contact.kind = \"compliant\" has no effect here"),
             "{message}"

@@ -33,7 +33,7 @@ impl CellOptions {
     /// # Errors
     /// [`StudyError`] naming the option or key that is wrong.
     pub fn cells(&self) -> Result<Cells, StudyError> {
-        let scenario = self.base.load_rigid(&[
+        let taken = [
             ("belt.friction", "--mu"),
             ("belt.profile", "--v-belt"),
             ("initial", "--initial"),
@@ -41,7 +41,8 @@ impl CellOptions {
             ("run.duration_s", "--transient-s and --record-s"),
             ("solver.relative_tolerance", "--relative-tolerance"),
             ("solver.absolute_tolerance", "--relative-tolerance"),
-        ])?;
+        ];
+        let scenario = self.base.load_rigid(&taken, &["arm", "impact", "solver"])?;
         let cells = Cells {
             plant: scenario.plant_parameters(),
             relative_tolerance: self.relative_tolerance.unwrap_or(RELATIVE_TOLERANCE),

@@ -3,4 +3,5 @@
 mod beyond_the_paper;
 mod bifurcation;
 mod malformed_input;
+mod options;
 mod page_commands;

@@ -25,7 +25,9 @@ impl StudyOptions for Options {
     type Outcome = Admissible;
 
     fn study(&self) -> Result<AdmissibleStudy, StudyError> {
-        let scenario = self.base.load_rigid(&[("belt.friction", "--mu")])?;
+        let scenario = self
+            .base
+            .load_rigid(&[("belt.friction", "--mu")], &["arm"])?;
         Ok(AdmissibleStudy {
             arm: scenario.arm,
             mu: self.mu,

@@ -7,7 +7,7 @@ use painleve_study_core::catalogue::{InShards, PageSection, StudyOptions, in_sha
 use painleve_study_core::figures::page_maker::PageMaker;
 use painleve_study_core::options::{
     BeltSpeedGrid, ControllerOptions, ConverterOptions, FrictionGrid, InitialOptions, Overrides,
-    RecordingOptions,
+    RecordingOptions, once,
 };
 
 use super::{ClosedLoopBifurcation, ClosedLoopDiagram, Row, page};
@@ -60,8 +60,8 @@ impl StudyOptions for Options {
             ("run.duration_s", "--transient-s and --record-s"),
         ])?;
         let study = ClosedLoopBifurcation {
-            controllers: self.controllers.controller.clone(),
-            converters: self.converters.converters.clone(),
+            controllers: once(&self.controllers.controller),
+            converters: once(&self.converters.converters),
             mu: self.friction.mu.values().to_vec(),
             v_belt_m_s: self.belt.v_belt.values().to_vec(),
             initial: self.initial.initial.list().to_vec(),

@@ -4,7 +4,7 @@ use clap::{Args, ValueEnum};
 use painleve_shared::Slip;
 use painleve_study_core::catalogue::{PageSection, StudyOptions};
 use painleve_study_core::figures::page_maker::PageMaker;
-use painleve_study_core::options::BaseOptions;
+use painleve_study_core::options::{BaseOptions, once};
 use painleve_study_core::{Grid, StudyError};
 
 use super::{Map, Regions, RegionsStudy, Theta2, page};
@@ -69,8 +69,10 @@ impl StudyOptions for Options {
     type Outcome = Regions;
 
     fn study(&self) -> Result<RegionsStudy, StudyError> {
-        let scenario = self.base.load_rigid(&[("belt.friction", "--mu")])?;
-        let slips = self.slip.iter().map(|slip| match slip {
+        let scenario = self
+            .base
+            .load_rigid(&[("belt.friction", "--mu")], &["arm"])?;
+        let slips = once(&self.slip).into_iter().map(|slip| match slip {
             SlipOption::Positive => Slip::Positive,
             SlipOption::Negative => Slip::Negative,
         });
@@ -79,7 +81,7 @@ impl StudyOptions for Options {
             mu: self.mu,
             theta1_deg: self.theta1_deg.clone(),
             theta1_dot_rad_s: self.theta1_dot_rad_s.clone(),
-            theta2: self.theta2.clone(),
+            theta2: once(&self.theta2),
             slips: slips.collect(),
         };
         settings.check()?;

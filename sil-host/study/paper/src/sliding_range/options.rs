@@ -6,7 +6,8 @@ use painleve_study_core::case::Reference;
 use painleve_study_core::catalogue::{InShards, PageSection, StudyOptions, in_shards};
 use painleve_study_core::figures::page_maker::PageMaker;
 use painleve_study_core::options::{
-    ControllerOptions, ConverterOptions, FrictionGrid, Overrides, PostureOption, metres, seconds,
+    ControllerOptions, ConverterOptions, FrictionGrid, Overrides, PostureOption, metres, once,
+    seconds,
 };
 
 use super::{Criterion, Row, SlidingRange, SlidingRanges, page};
@@ -97,11 +98,11 @@ impl StudyOptions for Options {
             ("run.duration_s", "--patience-s"),
         ])?;
         let study = SlidingRange {
-            controllers: self.controllers.controller.clone(),
-            converters: self.converters.converters.clone(),
-            postures: self.posture.iter().map(|&posture| posture.into()).collect(),
+            controllers: once(&self.controllers.controller),
+            converters: once(&self.converters.converters),
+            postures: once(&self.posture).into_iter().map(Into::into).collect(),
             mu: self.friction.mu.values().to_vec(),
-            references: self.reference.clone(),
+            references: once(&self.reference),
             overrides: self.overrides.overrides.clone(),
             criterion: Criterion {
                 within_m: self.within_m,

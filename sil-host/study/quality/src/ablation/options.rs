@@ -3,7 +3,7 @@
 use clap::{Args, ValueEnum};
 use painleve_study_core::StudyError;
 use painleve_study_core::catalogue::StudyOptions;
-use painleve_study_core::options::RandomRuns;
+use painleve_study_core::options::{RandomRuns, once};
 
 use super::{Ablation, AblationStudy, Condition};
 use crate::robustness::{Part, Row};
@@ -52,24 +52,6 @@ impl StudyOptions for Options {
 }
 
 /// Returns what was chosen, each once, or all if nothing was.
-fn or_all<T: Copy + PartialEq>(chosen: &[T], all: &[T]) -> Vec<T> {
-    let chosen = if chosen.is_empty() { all } else { chosen };
-    let mut once = Vec::new();
-    for it in chosen {
-        if !once.contains(it) {
-            once.push(*it);
-        }
-    }
-    once
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn what_is_given_twice_is_chosen_once() {
-        assert_eq!(or_all(&[3, 1, 3], &[1, 2, 3]), [3, 1]);
-        assert_eq!(or_all(&[], &[1, 2, 3]), [1, 2, 3]);
-    }
+fn or_all<T: Clone + PartialEq>(chosen: &[T], all: &[T]) -> Vec<T> {
+    once(if chosen.is_empty() { all } else { chosen })
 }

@@ -21,6 +21,8 @@ impl StudyOptions for Options {
     type Outcome = Captures;
 
     fn study(&self) -> Result<Capture, StudyError> {
+        let fixed = ["run.enable_at_s", "run.duration_s"];
+        self.runs.set.refuse_fixed(&fixed)?;
         let study = Capture {
             seed: self.runs.seed,
             runs: self.runs.runs,

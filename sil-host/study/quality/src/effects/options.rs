@@ -4,7 +4,7 @@ use clap::Args;
 use clap::builder::PossibleValuesParser;
 use painleve_study_core::StudyError;
 use painleve_study_core::catalogue::{InShards, StudyOptions, in_shards};
-use painleve_study_core::options::{ControllerOptions, RandomRuns, level};
+use painleve_study_core::options::{ControllerOptions, RandomRuns, level, once};
 
 use super::{Contact, EFFECTS, EffectsOutcome, EffectsStudy, Row, find};
 use crate::robustness::Criterion;
@@ -55,26 +55,30 @@ impl StudyOptions for Options {
     type Outcome = EffectsOutcome;
 
     fn study(&self) -> Result<EffectsStudy, StudyError> {
-        let none = EFFECTS[0].name;
-        let mut effects = vec![none];
+        let mut effects = vec![EFFECTS[0].name];
         if self.effect.is_empty() {
             effects.extend(EFFECTS[1..].iter().map(|effect| effect.name));
         } else {
             let chosen = self.effect.iter().filter_map(|name| find(name));
-            effects.extend(
-                chosen
-                    .map(|effect| effect.name)
-                    .filter(|name| *name != none),
-            );
+            for effect in chosen {
+                if !self.contact.iter().any(|contact| effect.acts_on(*contact)) {
+                    return Err(StudyError::Taken {
+                        key: format!("--effect {}", effect.name),
+                        instead: "use --contact compliant".into(),
+                    });
+                }
+                effects.push(effect.name);
+            }
         }
+        let effects = once(&effects);
         if !self.level.is_empty() && effects.len() != 2 {
             return Err(StudyError::LevelsOfSeveralEffects);
         }
         let study = EffectsStudy {
-            controllers: self.controllers.controller.clone(),
-            contacts: self.contact.clone(),
+            controllers: once(&self.controllers.controller),
+            contacts: once(&self.contact),
             effects,
-            levels: self.level.clone(),
+            levels: once(&self.level),
             seed: self.runs.seed,
             criterion: self.criterion,
             runs: self.runs.runs,

@@ -30,6 +30,9 @@ impl StudyOptions for Options {
     type Outcome = LiftOffs;
 
     fn study(&self) -> Result<LiftOff, StudyError> {
+        self.runs
+            .set
+            .refuse_fixed(&["controller.contact.evidence", "controller.governor.enabled"])?;
         let study = LiftOff {
             seed: self.runs.seed,
             runs: self.runs.runs,

@@ -4,7 +4,7 @@ use clap::Args;
 
 use super::{LoopMargins, LoopOutcome, Row};
 use painleve_study_core::catalogue::{InShards, StudyOptions, in_shards};
-use painleve_study_core::options::{ControllerOptions, Overrides, PostureOption};
+use painleve_study_core::options::{ControllerOptions, Overrides, PostureOption, once};
 use painleve_study_core::{Grid, StudyError};
 
 /// The sampled loop in the frequency domain: Bode plots, margins and steps along the belt.
@@ -49,7 +49,7 @@ impl StudyOptions for Options {
             ("controller.law", "--controller"),
         ])?;
         let study = LoopMargins {
-            controllers: self.controllers.controller.clone(),
+            controllers: once(&self.controllers.controller),
             posture: self.posture.into(),
             tips_m: self.tip.values().to_vec(),
             frequencies: self.frequencies.into(),

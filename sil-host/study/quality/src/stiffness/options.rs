@@ -42,7 +42,10 @@ impl StudyOptions for Options {
     type Outcome = StiffnessOutcome;
 
     fn study(&self) -> Result<Stiffness, StudyError> {
-        let scenario = self.base.load(&[("contact", "--stiffness")])?;
+        let scenario = self.base.load(
+            &[("contact", "--stiffness")],
+            &["arm", "belt", "impact", "solver"],
+        )?;
         let study = Stiffness {
             parameters: scenario.plant_parameters(),
             stiffnesses_n_m: self.stiffness.values().to_vec(),

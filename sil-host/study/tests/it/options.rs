@@ -1,0 +1,128 @@
+//! Options that a study refuses, because they would do nothing or change what it compares.
+
+// Helpers of tests may panic as tests do.
+#![allow(clippy::unwrap_used)]
+
+use painleve_study_core::StudyError;
+use painleve_study_core::catalogue::AnyStudy;
+
+fn study(line: &str) -> Result<Box<dyn AnyStudy>, StudyError> {
+    let (name, options) = line.split_once(' ').unwrap();
+    let entry = painleve_study::find(name).unwrap();
+    let command = entry.command().no_binary_name(true);
+    let matches = command.try_get_matches_from(options.split(' ')).unwrap();
+    (entry.read)(&matches).unwrap().study()
+}
+
+fn refusal(line: &str) -> String {
+    study(line)
+        .err()
+        .map_or("accepted".into(), |error| error.to_string())
+}
+
+#[test]
+fn keys_that_the_study_itself_sets_are_refused() {
+    for (line, key) in [
+        (
+            "lift-off --set controller.contact.evidence=encoders",
+            "controller.contact.evidence",
+        ),
+        (
+            "lift-off --set controller.governor.enabled=true",
+            "controller.governor.enabled",
+        ),
+        ("capture --set run.enable_at_s=100", "run.enable_at_s"),
+        ("capture --set run.duration_s=1", "run.duration_s"),
+    ] {
+        assert_eq!(
+            refusal(line),
+            format!("{key} has no effect here; the study sets it")
+        );
+    }
+    assert_eq!(
+        refusal("capture --set controller.contact.evidence=encoders"),
+        "accepted"
+    );
+}
+
+#[test]
+fn keys_that_a_study_without_control_does_not_use_are_refused() {
+    for (study, keys) in [
+        ("admissible", "arm"),
+        ("regions", "arm"),
+        ("bifurcation", "arm, impact, solver"),
+        ("poincare", "arm, impact, solver"),
+        ("stiffness", "arm, belt, impact, solver"),
+    ] {
+        for (text, key) in [
+            (
+                "controller.governor.enabled=false",
+                "controller.governor.enabled",
+            ),
+            ("converters.encoder.bits=12", "converters.encoder.bits"),
+            ("run={tick_hz=500}", "run"),
+        ] {
+            let expected = format!("{key} has no effect here; set keys of {keys}");
+            assert_eq!(
+                refusal(&format!("{study} --set {text}")),
+                expected,
+                "{study}"
+            );
+        }
+        assert_eq!(
+            refusal(&format!("{study} --set arm.tip_mass_kg=0.01")),
+            "accepted"
+        );
+        let unknown = refusal(&format!("{study} --set belt.frction=1"));
+        assert!(
+            unknown.starts_with("belt.frction: unknown key"),
+            "{unknown}"
+        );
+    }
+}
+
+#[test]
+fn an_effect_without_a_contact_that_has_it_is_refused() {
+    let line = "effects --effect seam --runs 1 --contact";
+    let expected = "--effect seam has no effect here; use --contact compliant";
+    assert_eq!(refusal(&format!("{line} rigid")), expected);
+    assert_eq!(refusal(&format!("{line} rigid,compliant")), "accepted");
+    assert_eq!(refusal("effects --runs 1 --contact rigid"), "accepted");
+}
+
+#[test]
+fn what_is_given_twice_is_computed_once() {
+    for (twice, once) in [
+        (
+            "effects --runs 1 --effect none,none",
+            "effects --runs 1 --effect none",
+        ),
+        (
+            "effects --runs 1 --contact compliant,compliant --controller hybrid,hybrid --effect push-along,push-along --level 0.02,0.02",
+            "effects --runs 1 --contact compliant --controller hybrid --effect push-along --level 0.02",
+        ),
+        (
+            "ablation --on rigid,rigid --without probe,probe",
+            "ablation --on rigid --without probe",
+        ),
+        (
+            "loop --controller pid,pid --tip=0.1,0.1",
+            "loop --controller pid --tip=0.1",
+        ),
+        (
+            "regions --theta2 positive,positive --slip negative,negative",
+            "regions --theta2 positive --slip negative",
+        ),
+        (
+            "sliding-range --controller pid,pid --converters ideal,ideal --posture elbow-up,elbow-up --mu 0.6,0.6 --reference step,step",
+            "sliding-range --controller pid --converters ideal --posture elbow-up --mu 0.6 --reference step",
+        ),
+        (
+            "closed-loop-bifurcation --controller pid,pid --converters ideal,ideal --v-belt=-0.4,-0.4",
+            "closed-loop-bifurcation --controller pid --converters ideal --v-belt=-0.4",
+        ),
+    ] {
+        let rows = [twice, once].map(|line| study(line).unwrap().row_count());
+        assert_eq!(rows[0], rows[1], "{twice}");
+    }
+}
