@@ -2,7 +2,7 @@
 //!
 //! Each point contributes its depth, the prior each parameter's distance from its value, both in standard deviations
 //! (Gauss–Newton, with steps halved until the sum of squares falls). The noise is what the fit leaves over, times the
-//! number of neighbours that share an error. Points beyond some deviations count less (Huber).
+//! number of neighbours that share an error.
 
 use nalgebra::SMatrix;
 use painleve_shared::Posture;
@@ -22,8 +22,6 @@ const HALVINGS: u32 = 12;
 const SETTLED: f64 = 1e-10;
 /// Rounds in which the noise is estimated.
 const ROUNDS: usize = 4;
-/// Deviation beyond which a point counts less, standard deviations.
-const OUTLYING: f64 = 2.5;
 /// Least noise, as a part of the assumed deviation.
 const LEAST_NOISE: f64 = 0.2;
 /// Largest |z_t| at which the tip's distance from the edges counts, as a part of the reach: the governor's margin.
@@ -43,8 +41,6 @@ pub(crate) struct Row {
     pub by_joint: [f64; 2],
     /// The depth.
     pub off: f64,
-    /// How much the point counts, 0 … 1.
-    pub weight: f64,
 }
 
 /// The most probable parameters.
@@ -116,19 +112,11 @@ impl Fit {
         }
     }
 
-    /// Returns the sum of squares, with far points by their distance.
+    /// Returns the sum of squares.
     fn cost(&self, points: &Points, prior: &Prior, parameters: &Parameters) -> f64 {
-        let far = |deviation: f64| {
-            let size = deviation.abs();
-            if size < OUTLYING {
-                size * size
-            } else {
-                OUTLYING * (2.0 * size - OUTLYING)
-            }
-        };
         let places = points.points.iter().map(|point| point.place(parameters));
         let of_points: f64 = places
-            .map(|place| far(place.depth_m / (self.noise * points.deviation_m(&place))))
+            .map(|place| (place.depth_m / (self.noise * points.deviation_m(&place))).powi(2))
             .sum();
         let off = (parameters.0 - prior.parameters.0).component_div(&prior.deviations);
         of_points + off.norm_squared()
@@ -139,12 +127,10 @@ impl Fit {
         points.points.iter().map(|point| {
             let place = point.place_by(&self.parameters);
             let deviation_m = self.noise * points.deviation_m(&place);
-            let off = place.depth_m / deviation_m;
             Row {
                 by: place.depth_by.component_mul(&prior.deviations) / deviation_m,
                 by_joint: place.depth_by_joint.map(|by| by / deviation_m),
-                off,
-                weight: (OUTLYING / off.abs()).min(1.0),
+                off: place.depth_m / deviation_m,
             }
         })
     }
@@ -154,12 +140,9 @@ impl Fit {
         let mut information = Square::identity();
         let mut gradient =
             (self.parameters.0 - prior.parameters.0).component_div(&prior.deviations);
-        for Row {
-            by, off, weight, ..
-        } in self.rows(points, prior)
-        {
-            information.ger(weight, &by, &by, 1.0);
-            gradient += by * (weight * off);
+        for Row { by, off, .. } in self.rows(points, prior) {
+            information.ger(1.0, &by, &by, 1.0);
+            gradient += by * off;
         }
         (information, gradient)
     }

@@ -102,7 +102,7 @@ fn other_posture(points: &Points, fit: &Fit) -> Option<Refusal> {
 /// squares falls by δ vᵀ r.
 fn slip(points: &Points, prior: &Prior, limits: &Limits, fit: &Fit) -> Option<Refusal> {
     let rows: Vec<Row> = fit.rows(points, prior).collect();
-    let total: f64 = rows.iter().map(|row| row.weight * row.off * row.off).sum();
+    let total: f64 = rows.iter().map(|row| row.off * row.off).sum();
     let decomposed = fit.information.cholesky()?;
     let mut best: Option<(f64, Refusal)> = None;
     for joint in 0..2 {
@@ -110,9 +110,9 @@ fn slip(points: &Points, prior: &Prior, limits: &Limits, fit: &Fit) -> Option<Re
         let (mut square, mut product) = (0.0, 0.0);
         for (row, point) in rows.iter().zip(&points.points).rev() {
             let by = row.by_joint[joint];
-            common += row.by * (row.weight * by);
-            square += row.weight * by * by;
-            product += row.weight * by * row.off;
+            common += row.by * by;
+            square += by * by;
+            product += by * row.off;
             let own = square - common.dot(&decomposed.solve(&common));
             if own < OWN * square {
                 continue;
