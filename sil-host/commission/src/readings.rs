@@ -3,7 +3,7 @@
 use nalgebra::Vector2;
 use painleve_firmware::estimate::encoder_correction::EncoderCorrection;
 use painleve_shared::counts::{EncoderCounts, EncoderScale, ForceCounts, TorqueCounts};
-use painleve_shared::{JointMotion, JointTorque, LinkMotion, Pose};
+use painleve_shared::{JointTorque, LinkMotion};
 
 use crate::{CommissionError, Expected, Mistake, RawReadings, Rig};
 
@@ -170,15 +170,7 @@ impl<'a, R: Rig> Session<'a, R> {
             angles[joint] =
                 f64::from(scale.counts_from_zero(forward)) * scale.rad_per_count::<f64>();
         }
-        let encoders_rad = JointMotion::from_array(angles.map(|angle| angle as f32));
-        // As the board starts, and once more: a correction changes by a seventeenth of the angle's error at most.
-        let mut added_rad = JointMotion::from_array(self.correction.zero_rad);
-        for _ in 0..2 {
-            let near_rad = encoders_rad + added_rad;
-            added_rad = self.correction.in_pose(&Pose::new(&near_rad.to_links()));
-        }
-        let added_rad = added_rad.to_array().map(f64::from);
-        Some(JointMotion::new(angles[0] + added_rad[0], angles[1] + added_rad[1]).to_links())
+        Some(self.correction.links_rad(angles))
     }
 
     /// Returns raw forces minus the tare, N, as (f_t, f_n) in the cell's directions.

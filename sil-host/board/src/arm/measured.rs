@@ -5,7 +5,7 @@ use painleve_plant::{Configuration, ContactMode, Snapshot};
 use painleve_shared::frame::{ActuatorFrame, SensorFrame, StatusFlags};
 use painleve_shared::kinematics::Pose;
 use painleve_shared::range::OutOfRange;
-use painleve_shared::{Arm, JointMotion, JointTorque, LinkMotion};
+use painleve_shared::{Arm, JointTorque, LinkMotion};
 
 /// Scalings of a configured arm.
 #[derive(Clone, Debug)]
@@ -41,12 +41,13 @@ impl Measured {
 
     fn snapshot(&self, sensor: &SensorFrame, answer: &ActuatorFrame) -> Snapshot {
         let converters = &self.configuration.converters;
-        let [joint_1, joint_2] = [0, 1].map(|joint| {
+        let encoders_rad = [0, 1].map(|joint| {
             let scale = &converters.encoders[joint];
             let counts = scale.counts_from_zero(sensor.joints[joint]);
             f64::from(counts) * scale.rad_per_count::<f64>()
         });
-        let theta = JointMotion::new(joint_1, joint_2).to_links();
+        let estimator = &self.configuration.settings.estimator;
+        let theta = estimator.encoders.links_rad(encoders_rad);
         let pose = Pose::new(&theta);
         let tip_m = self.arm.tip_m(&pose);
         let force_n = |counts| f64::from(converters.force.value(counts));
@@ -88,11 +89,17 @@ mod tests {
     use painleve_plant::simulation::Simulation;
     use painleve_plant::statistics::Statistics;
 
-    /// The simulated arm's counts, scaled back, agree with the arm within a count.
+    /// The simulated arm's counts, corrected and scaled back, agree with the arm within a count.
     #[test]
     #[allow(clippy::unwrap_used)]
     fn scaled_counts_agree_with_the_arm() {
-        let scenario = Scenario::default();
+        let overrides = [
+            "converters.encoder.mounting_error_rad=[-0.03, 0.02]".to_owned(),
+            "controller.estimator.encoders.zero_rad=[0.03, -0.02]".to_owned(),
+        ];
+        let scenario = Scenario::default()
+            .with_overrides("corrected", &overrides)
+            .unwrap();
         let configuration = scenario.controller_configuration();
         let measured = Measured::new(&configuration).unwrap();
         let mut simulation = Simulation::new(&scenario).unwrap();
