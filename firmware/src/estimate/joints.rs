@@ -35,7 +35,7 @@ settings! {
         /// Standard deviation of the tip's distance from the edges by what is not known of encoders, links and belt; 0
         /// for an arm that is known exactly. The governor keeps a distance for it. Play of the gears counts 1 m a radian;
         /// of a commissioned arm, it is part of `knowledge.told_m`.
-        tip_deviation_m: f32 = 0.0, 0.0..=0.1, "m";
+        tip_deviation_m: f32 = 0.0, 0.0..=1.0, "m";
     }
 }
 
