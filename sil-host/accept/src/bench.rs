@@ -156,7 +156,9 @@ impl<P: Port> Bench<P> {
             let expected = answers.len() + together.len();
             while answers.len() < expected {
                 match self.board.listen(PATIENCE)? {
-                    Some(Response::Refused) => return Err(StepError::Probe(address(probes[0]))),
+                    Some(Response::Refused) => {
+                        return Err(StepError::Probe(address(probes[answers.len()])));
+                    }
                     Some(answer) => answers.extend(probed(&answer)),
                     None => {
                         return Err(StepError::Lost {

@@ -13,6 +13,8 @@ mod html;
 mod report;
 pub mod steps;
 
+use core::ops::ControlFlow;
+
 use painleve_board::{BoardError, Port, Serial};
 use painleve_shared::stored::{StoredConfiguration, StoredState};
 
@@ -32,15 +34,20 @@ pub enum AcceptError {
         "the board holds a stored configuration, which the acceptance would erase: remove it with `painleve drive --port PORT --forget` first"
     )]
     Stored,
+    /// The caller has ended it.
+    #[error("interrupted")]
+    Interrupted,
 }
 
-/// Accepts a board: carries out every step and calls `done` after each.
+/// Accepts a board: carries out every step and calls `done` after each, which may end the acceptance. Whatever ends it, no
+/// configuration is left on the board.
 ///
 /// # Errors
-/// [`AcceptError`] if the board does not answer at the start, has another image or holds a configuration.
+/// [`AcceptError`] if the board does not answer at the start, has another image or holds a configuration, or if `done` has
+/// ended it.
 pub fn accept<P: Port>(
     mut board: Serial<P>,
-    mut done: impl FnMut(&StepReport),
+    mut done: impl FnMut(&StepReport) -> ControlFlow<()>,
 ) -> Result<Acceptance, AcceptError> {
     board.identify()?;
     let stored = board.stored()?.state;
@@ -48,7 +55,7 @@ pub fn accept<P: Port>(
         return Err(AcceptError::Stored);
     }
     let mut bench = Bench::new(board);
-    let mut reports = Vec::new();
+    let (mut reports, mut is_ended) = (Vec::new(), false);
     for step in steps::<P>() {
         let start = bench.board.now();
         // Each step begins with a board that waits for frames.
@@ -63,10 +70,10 @@ pub fn accept<P: Port>(
             duration_s: (bench.board.now() - start).as_secs_f64(),
             checks,
         };
-        done(&report);
+        is_ended = done(&report).is_break();
         reports.push(report);
         // Nothing is known of its registers.
-        if bench.chip.is_none() {
+        if is_ended || bench.chip.is_none() {
             break;
         }
     }
@@ -75,10 +82,13 @@ pub fn accept<P: Port>(
     if let (Some(check), Some(report)) = (empty(&mut bench), reports.get_mut(storing)) {
         report.checks.push(check);
         report.verdict = Verdict::of(&report.checks);
-        done(report);
+        is_ended |= done(report).is_break();
     }
     // Registers have their usual values again, and the board may drive an arm.
     let _ = bench.reset();
+    if is_ended {
+        return Err(AcceptError::Interrupted);
+    }
     Ok(Acceptance::new(bench.chip, reports))
 }
 

@@ -21,7 +21,7 @@ use crate::port::{Port, SerialPort};
 use crate::timing::Unit;
 
 /// Time allowed for the answer to any request other than a frame.
-const PATIENCE: Duration = Duration::from_millis(200);
+pub(crate) const PATIENCE: Duration = Duration::from_millis(200);
 
 /// Time allowed for the answer to a frame in lockstep.
 const LOCKSTEP_PATIENCE: Duration = Duration::from_millis(50);

@@ -7,6 +7,7 @@ use painleve_plant::law_choice::build;
 use painleve_shared::message::{Request, Response};
 use painleve_shared::stored::{StoredConfiguration, StoredState};
 
+use crate::serial::PATIENCE;
 use crate::{BoardError, Port, Serial};
 
 /// Longest wait for the erasure of two sectors.
@@ -53,18 +54,23 @@ impl<P: Port> Serial<P> {
     /// # Errors
     /// [`BoardError::Silent`] if the board does not answer.
     pub fn stored(&mut self) -> Result<StoredConfiguration, BoardError> {
-        self.ask_for_stored(&Request::Stored)
+        self.ask_for_stored(&Request::Stored, PATIENCE)
     }
 
     fn change(&mut self, request: &Request<'_>) -> Result<StoredConfiguration, BoardError> {
-        let stored = self.ask_for_stored(request)?;
+        // Not repeated meanwhile: every repetition would store it again.
+        let stored = self.ask_for_stored(request, ERASURE)?;
         match stored.state {
             StoredState::Empty | StoredState::Intact => Ok(stored),
             state => Err(BoardError::NotStored(state)),
         }
     }
 
-    fn ask_for_stored(&mut self, request: &Request<'_>) -> Result<StoredConfiguration, BoardError> {
+    fn ask_for_stored(
+        &mut self,
+        request: &Request<'_>,
+        patience: Duration,
+    ) -> Result<StoredConfiguration, BoardError> {
         let is_wanted = |response: &Response| {
             matches!(
                 response,
@@ -74,8 +80,7 @@ impl<P: Port> Serial<P> {
                     | Response::OtherBuild { .. }
             )
         };
-        // Not repeated meanwhile: every repetition would store it again.
-        match self.ask_within(request, ERASURE, ERASURE, is_wanted)? {
+        match self.ask_within(request, patience, ERASURE, is_wanted)? {
             Response::Stored(stored) => Ok(stored),
             Response::OtherBuild { build } => Err(BoardError::other_build(build)),
             Response::RateRefused(rate) => Err(BoardError::RateRefused(rate)),

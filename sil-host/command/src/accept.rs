@@ -1,11 +1,13 @@
 //! `painleve accept`: tests a bare board, and writes a report.
 
+use std::ops::ControlFlow;
 use std::path::PathBuf;
 
 use clap::Args;
 use painleve_accept::{AcceptError, StepReport, Verdict, accept};
 use painleve_board::Serial;
 use painleve_files::atomic_file::{commit_all, prepare};
+use painleve_process::interrupt::Interrupt;
 use painleve_process::terminal::warn;
 
 use super::output::warn_of_earlier;
@@ -26,7 +28,7 @@ pub struct AcceptArguments {
     json: bool,
 }
 
-/// Accepts the board behind a port; the report is written whatever it says.
+/// Accepts the board behind a port; the report is written whatever it says. Ctrl-C ends it after the present step.
 ///
 /// # Errors
 /// [`CommandError`] if the board cannot be tested or is not accepted, or a file cannot be written.
@@ -35,11 +37,21 @@ pub fn run(arguments: &AcceptArguments) -> Result<(), CommandError> {
     let object = page.with_extension("json");
     distinct_files::check(&[("--output", page), ("the JSON report", &object)])?;
     let warn_of_earlier = || warn_of_earlier(&[page, &object]);
+    let interrupt = Interrupt::catch()?;
     let board = Serial::connect(&arguments.port).inspect_err(|_| warn_of_earlier())?;
-    let accepted = accept(board, tell).inspect_err(|_| warn_of_earlier());
+    // A step that is under way may have stored a configuration.
+    let accepted = accept(board, |step| {
+        tell(step);
+        match interrupt.is_requested() {
+            true => ControlFlow::Break(()),
+            false => ControlFlow::Continue(()),
+        }
+    })
+    .inspect_err(|_| warn_of_earlier());
     let acceptance = accepted.map_err(|error| match error {
         AcceptError::Board(error) => CommandError::Board(error),
         AcceptError::Stored => CommandError::Accept(error),
+        AcceptError::Interrupted => CommandError::Interrupted,
     })?;
     let json = serde_json::to_string_pretty(&acceptance).map_err(output)?;
     commit_all(vec![

@@ -17,6 +17,7 @@ use painleve_shared::counts::TorqueCounts;
 use painleve_shared::frame::{ActuatorFrame, SensorFrame};
 use painleve_shared::message::{FrameSource, Health, Request, Response};
 
+use crate::serial::PATIENCE;
 use crate::{BoardError, ConnectedBoard, LineHealth, Serial};
 
 /// Time between two heartbeats: three may be lost before the board stops.
@@ -92,6 +93,17 @@ impl ConnectedArm {
     /// [`BoardError::System`] if the port fails.
     pub fn permit_arming(&mut self, permitted: bool) -> Result<(), BoardError> {
         self.serial.send(&Request::PermitArming(permitted))
+    }
+
+    /// Permits arming, and waits until the board has confirmed it. Skips ticks meanwhile.
+    ///
+    /// # Errors
+    /// [`BoardError::Silent`] if the board does not answer.
+    pub fn permit_arming_surely(&mut self) -> Result<(), BoardError> {
+        let is_confirmed = |it: &Response| *it == Response::Permission(true);
+        self.serial
+            .ask(&Request::PermitArming(true), PATIENCE, is_confirmed)?;
+        Ok(())
     }
 
     /// Commands raw torques; without effect unless the source is [`FrameSource::Commissioning`]. They

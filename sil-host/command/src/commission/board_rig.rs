@@ -171,7 +171,7 @@ impl BoardRig {
 
     /// Waits until the board has armed.
     fn wait_for_enable(&mut self) -> Result<(), BoardRigError> {
-        self.arm.permit_arming(true)?;
+        self.arm.permit_arming_surely()?;
         let start = Instant::now();
         while start.elapsed() < ENABLE_LIMIT {
             let Some((sensor, answer)) = self.next_tick()? else {

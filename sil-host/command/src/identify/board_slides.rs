@@ -106,16 +106,21 @@ impl SlideRig for BoardSlides {
         while !self.operator.confirms()? {
             self.next_event(&mut arm)?;
         }
-        arm.permit_arming(true)?;
+        arm.permit_arming_surely()?;
         warn(
             "operator: open the switch ENABLE, then close it, and let go when the drive takes the arm over; when the slide ends, \
              the torque goes off: be ready to hold the arm, and stop the belt",
         );
         let duration = Duration::from_secs_f64(scenario.run.duration_s);
         let slid = self.slid(&mut arm, duration);
-        // Whatever ended the slide, the torque is off.
+        // Whatever ended the slide, the torque goes off; a board that cannot be reached takes it off by itself.
         let stopped = arm.stop();
-        warn("operator: the torque is off; hold the arm, and stop the belt");
+        warn(match stopped {
+            Ok(()) => "operator: the torque is off; hold the arm, and stop the belt",
+            Err(_) => {
+                "operator: the board does not answer: open the switch ENABLE, keep clear, and stop the belt"
+            }
+        });
         let slid = slid?;
         stopped?;
         Ok(slid)

@@ -7,7 +7,9 @@ mod defect;
 mod port;
 mod program;
 
-use painleve_accept::{Acceptance, Verdict, accept};
+use core::ops::ControlFlow;
+
+use painleve_accept::{AcceptError, Acceptance, Verdict, accept};
 use painleve_board::Serial;
 use painleve_chips::{MICROSECOND, MILLISECOND};
 use painleve_flash_image::bare::{BareBench, Output};
@@ -61,7 +63,7 @@ fn board<C: BoardChip>(seed: u64, defect: Option<Defect>) -> EmulatedPort<C> {
 
 fn acceptance<C: BoardChip>(seed: u64, defect: Option<Defect>) -> Acceptance {
     let board = Serial::over(board::<C>(seed, defect)).unwrap();
-    accept(board, |_| ()).unwrap_or_else(|error| panic!("seed {seed}, {defect:?}: {error}"))
+    accept(board, |_| ControlFlow::Continue(())).unwrap_or_else(|error| panic!("seed {seed}, {defect:?}: {error}"))
 }
 
 /// Returns what has failed, for messages.
@@ -80,6 +82,18 @@ fn nothing_is_found<C: BoardChip>(boards: u64) {
         assert_eq!(failures(&acceptance), [""; 0], "{} {seed}", C::IMAGE);
         assert_eq!(acceptance.verdict, Verdict::Passed);
     }
+}
+
+#[test]
+fn an_acceptance_can_be_ended_after_a_step() {
+    let board = Serial::over(board::<F405>(FIRST_SEED, None)).unwrap();
+    let mut steps = 0;
+    let ended = accept(board, |_| {
+        steps += 1;
+        ControlFlow::Break(())
+    });
+    assert!(matches!(ended, Err(AcceptError::Interrupted)), "{ended:?}");
+    assert_eq!(steps, 1);
 }
 
 #[test]
