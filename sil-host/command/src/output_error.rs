@@ -168,6 +168,11 @@ pub enum InputError {
     /// The rehearsed arm cannot be simulated.
     #[error(transparent)]
     Rehearsal(#[from] SimulatedError),
+    /// A scenario of a simulated arm for a real one.
+    #[error(
+        "this scenario describes a simulated arm (knowledge.source: {0}): commission the real one with painleve commission --port"
+    )]
+    Rehearsed(String),
     /// `--live` together with another host.
     #[error("--live runs the controller in this process: leave out --host")]
     LiveHost,

@@ -179,7 +179,7 @@ pub(crate) fn suppose_drawn(scenario: &mut Scenario) {
 }
 
 /// Returns whether a scenario has never been commissioned or identified.
-pub(crate) fn is_new(scenario: &Scenario) -> bool {
+pub fn is_new(scenario: &Scenario) -> bool {
     let of_new = Knowledge {
         told_m: scenario.knowledge.told_m,
         ..Knowledge::default()
@@ -392,7 +392,7 @@ fn posture(scenario: &Scenario) -> Result<Posture, OutOfRange> {
 
 /// Returns a deviation of the tip, m, as a setting.
 fn setting(deviation_m: f64) -> f32 {
-    rounded(deviation_m).min(0.1) as f32
+    rounded(deviation_m) as f32
 }
 
 /// Returns a number to eight decimals, which is what a file needs.
@@ -453,6 +453,8 @@ impl Found {
             mut stiffness_nm_rad,
             ..
         } = scenario.knowledge;
+        // Torques that show nothing leave what was known.
+        let has_torques = self.joints.left_over_nm.is_some();
         for (joint, found) in self.joints.joints.iter().enumerate() {
             for (value, deviation, estimate) in [
                 (
@@ -466,7 +468,7 @@ impl Found {
                     found.stiffness_nm_rad,
                 ),
             ] {
-                if is_better(estimate, *value) {
+                if has_torques && is_better(estimate, *value) {
                     *value = rounded(estimate.value).max(0.0) as f32;
                     *deviation = rounded(estimate.deviation);
                 }

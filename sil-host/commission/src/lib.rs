@@ -43,6 +43,7 @@ use painleve_shared::{Arm, ArmParameters, LinkMotion, OutOfRange, Posture};
 
 pub use mistake::{Deviation, Mistake};
 use readings::Session;
+pub use slide::NoSlide;
 
 /// Raw readings of one control tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -218,8 +219,8 @@ pub struct Commissioned {
     pub correction: EncoderCorrection,
     /// Height of the first joint over the belt, m.
     pub height_m: f64,
-    /// Friction coefficient; `None` if the tip did not slide within the torque limit.
-    pub friction: Option<f64>,
+    /// Friction coefficient, or why it has not been measured.
+    pub friction: Result<f64, NoSlide>,
     /// Link angles of the arm at rest on the belt, rad.
     pub rest_rad: LinkMotion<f64>,
     /// Deviations from the scenario that the result corrects.
@@ -244,7 +245,7 @@ impl Commissioned {
         if let Some(model) = &mut corrected.arm_model {
             model.height_m = self.height_m as f32;
         }
-        if let Some(friction) = self.friction {
+        if let Ok(friction) = self.friction {
             corrected.belt.friction = friction;
             corrected.controller.friction.first_guess = friction.min(2.0) as f32;
         }

@@ -123,6 +123,17 @@ pub enum Mistake {
         /// Index of the joint.
         joint: usize,
     },
+    /// The torque limit is too low for the force cell.
+    #[error(
+        "torque stage of {}: within the torque limit, the force changes by {change_n:.3} N only, too little for the force cell; raise --torque-limit-nm",
+        JOINT_NAMES[*.joint]
+    )]
+    TorqueTooSmall {
+        /// Index of the joint.
+        joint: usize,
+        /// Expected change of the force, N.
+        change_n: f64,
+    },
     /// The force cell gives no readings, or codes that no force gives.
     #[error(
         "force cell: no readings between the codes converters.mounting.force_lowest_code and force_highest_code; check its supply, its wires and its select line"

@@ -22,8 +22,8 @@ const RISE_PER_S: f64 = 0.5;
 /// Time in which the normal force falls to its share, s.
 const RELIEF_S: f64 = 0.1;
 
-/// Largest commanded |f_t|/f_n.
-const LARGEST_RATIO: f64 = 1.5;
+/// Largest commanded |f_t|/f_n. Pushed harder, a tip that holds turns about its contact, and shows too small a friction.
+const LARGEST_RATIO: f64 = 1.1;
 
 /// Normal force of a sliding tip, as a part of the commanded one.
 const PRESSED: f64 = 0.5;
@@ -37,21 +37,39 @@ const MEAN_S: f64 = 0.01;
 /// Pause after a slide, s.
 const PAUSE_S: f64 = 0.1;
 
-/// Measures the friction coefficient; `None` if the tip does not slide within the torque limit.
+/// Why the friction has not been measured.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum NoSlide {
+    /// More torque would be needed.
+    #[error("the tip did not slide within --torque-limit-nm")]
+    TorqueLimit,
+    /// The tip holds however much it is pushed.
+    #[error(
+        "the tip did not slide under a tangential force of {LARGEST_RATIO} times the normal force"
+    )]
+    Holds,
+    /// The tip has left the belt.
+    #[error("the tip left the belt instead of sliding")]
+    LeftBelt,
+}
+
+/// Measures the friction coefficient: the mean of both directions, or that of the one in which the tip slides.
 pub(crate) fn measure<R: Rig>(
     session: &mut Session<'_, R>,
     rest: &RestFound,
     force_reversed: [bool; 2],
-) -> Result<Option<f64>, CommissionError<R::Error>> {
-    let mut ratios = Vec::new();
-    for direction in [1.0, -1.0] {
-        ratios.extend(slide(session, rest, force_reversed, direction)?);
+) -> Result<Result<f64, NoSlide>, CommissionError<R::Error>> {
+    let mut ratios = [Err(NoSlide::TorqueLimit); 2];
+    for (ratio, direction) in ratios.iter_mut().zip([1.0, -1.0]) {
+        *ratio = slide(session, rest, force_reversed, direction)?;
         for _ in 0..session.ticks(PAUSE_S) {
             session.exchange(JointTorque::zeros())?;
         }
     }
-    let count = ratios.len();
-    Ok((count > 0).then(|| ratios.iter().sum::<f64>() / count as f64))
+    Ok(match ratios {
+        [Ok(one), Ok(other)] => Ok((one + other) / 2.0),
+        [one, other] => one.or(other),
+    })
 }
 
 /// Pushes the tip along ±t until it slides; the ratio of the forces then.
@@ -60,7 +78,7 @@ fn slide<R: Rig>(
     rest: &RestFound,
     force_reversed: [bool; 2],
     direction: f64,
-) -> Result<Option<f64>, CommissionError<R::Error>> {
+) -> Result<Result<f64, NoSlide>, CommissionError<R::Error>> {
     let limit_nm = session.expected.torque_limit_nm;
     let force_n = |share: f64, ratio: f64| {
         let normal_n = share * rest.normal_force_n;
@@ -75,7 +93,7 @@ fn slide<R: Rig>(
         steps.take_while(|ratio| is_allowed(*ratio)).count()
     };
     let Some(share) = NORMAL_SHARES.into_iter().max_by_key(|share| reach(*share)) else {
-        return Ok(None);
+        return Ok(Err(NoSlide::TorqueLimit));
     };
     let mut theta = rest.theta_rad;
     let mut start_m = None;
@@ -86,7 +104,7 @@ fn slide<R: Rig>(
         let ratio = f64::from(tick) * step;
         let torque_nm = torque_for(session, &theta, &force_n(share, ratio));
         if torque_nm.amax() > limit_nm {
-            return Ok(None);
+            return Ok(Err(NoSlide::TorqueLimit));
         }
         let part = (f64::from(tick) / f64::from(session.ticks(RELIEF_S))).min(1.0);
         let raw = session.exchange(torque_nm * part)?;
@@ -111,10 +129,14 @@ fn slide<R: Rig>(
             let mean = recent.iter().sum::<Vector2<f64>>() / recent.len() as f64;
             // A tip that has left the belt shows no friction.
             let is_pressed = mean.y > PRESSED * force_n(share, ratio).y;
-            return Ok(is_pressed.then(|| (mean.x / mean.y).abs()));
+            return Ok(if is_pressed {
+                Ok((mean.x / mean.y).abs())
+            } else {
+                Err(NoSlide::LeftBelt)
+            });
         }
     }
-    Ok(None)
+    Ok(Err(NoSlide::Holds))
 }
 
 /// Returns the joint torques that hold this force (f_t, f_n) on the tip at rest, N·m: u = w − Jᵀ f.

@@ -27,6 +27,9 @@ const RATIO: core::ops::Range<f64> = 0.65..1.5;
 /// Largest part of an effect that the model does not explain.
 const UNEXPLAINED: f64 = 0.25;
 
+/// Least change of the force that is told from its noise, counts.
+const LEAST_COUNTS: f64 = 10.0;
+
 /// Largest motion of the tip during the test, m.
 const STILL_M: f64 = 0.005;
 
@@ -52,6 +55,10 @@ pub(crate) fn measure<R: Rig>(
     for joint in 0..2 {
         let largest = CHANGE * rest.normal_force_n / model.column(joint).y.abs();
         let torque_nm = largest.min(session.expected.torque_limit_nm);
+        let change_n = torque_nm * model.column(joint).norm();
+        if change_n < LEAST_COUNTS * f64::from(session.expected.converters.force.per_count()) {
+            return Err(Mistake::TorqueTooSmall { joint, change_n }.into());
+        }
         let [plus, minus] = [1.0, -1.0].map(|sign| {
             let mut torques = [0.0; 2];
             torques[joint] = sign * torque_nm;

@@ -4,7 +4,8 @@
 
 use painleve_commission::simulated::{BuiltInMistake, SimulatedError, SimulatedRig, random_arm};
 use painleve_commission::{
-    CommissionError, Commissioned, Expected, Mistake, OperatorTask, RawReadings, Rig, commission,
+    CommissionError, Commissioned, Expected, Mistake, NoSlide, OperatorTask, RawReadings, Rig,
+    commission,
 };
 use painleve_plant::decimal::as_written;
 use painleve_plant::scenario::{Knowledge, Scenario};
@@ -346,11 +347,41 @@ fn play_that_the_operator_has_told_is_kept() {
 }
 
 #[test]
+fn a_torque_below_the_noise_of_the_force_cell_blames_no_part() {
+    let scenario = Scenario::default();
+    for seed in FIRST_SEED..FIRST_SEED + 8 {
+        let expected = Expected::new(&scenario, 2e-3).unwrap();
+        let mut rig = SimulatedRig::new(&scenario, None, seed);
+        let refusal = commission(&mut rig, &expected).unwrap_err();
+        let is_named = matches!(
+            refusal,
+            CommissionError::Refused(Mistake::TorqueTooSmall { .. })
+        );
+        assert!(is_named, "{refusal}");
+    }
+}
+
+#[test]
+fn a_friction_too_large_to_be_measured_is_told_from_a_torque_limit() {
+    let friction = |friction: f64, torque_limit_nm: f64| {
+        let overrides = [format!("belt.friction={friction}")];
+        let scenario = Scenario::default()
+            .with_overrides("rough", &overrides)
+            .unwrap();
+        let expected = Expected::new(&scenario, torque_limit_nm).unwrap();
+        let mut rig = SimulatedRig::new(&scenario, None, 2);
+        commission(&mut rig, &expected).unwrap().friction
+    };
+    assert_eq!(friction(0.9, 0.2), Err(NoSlide::TorqueLimit));
+    assert_eq!(friction(1.9, 5.0), Err(NoSlide::Holds));
+}
+
+#[test]
 fn friction_is_measured_to_a_tenth() {
     let mut measured = 0;
     for seed in FIRST_SEED..FIRST_SEED + 40 {
         let scenario = random_arm(seed).unwrap();
-        if let Some(friction) = commissioned(&scenario, None, seed).unwrap().friction {
+        if let Ok(friction) = commissioned(&scenario, None, seed).unwrap().friction {
             let actual = scenario.belt.friction;
             assert!(
                 (friction / actual - 1.0).abs() < 0.15,

@@ -96,7 +96,7 @@ fn the_commands_of_the_tutorials_succeed() {
         executed += 1;
     }
     assert!(executed >= 10, "only {executed} commands found");
-    for file in ["out/run.html", "out/my-arm.html", "out/commissioned.toml"] {
+    for file in ["out/run.html", "out/my-arm.html", "out/rehearsed.toml"] {
         assert!(bench.path(file).exists(), "{file}");
     }
 }

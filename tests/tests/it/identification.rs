@@ -29,9 +29,9 @@ fn a_rehearsal_writes_what_it_has_found() {
             "{found}"
         );
     }
-    let differences = bench.report(&["diff", "hybrid-elbow-down", "out/identified.toml", "--json"]);
+    let differences = bench.report(&["diff", "hybrid-elbow-down", "out/rehearsed.toml", "--json"]);
     let written = differences["differences"].as_array().unwrap();
-    let page = std::fs::read_to_string(bench.path("out/identified.html")).unwrap();
+    let page = std::fs::read_to_string(bench.path("out/rehearsed.html")).unwrap();
     for part in [
         "Identification: hybrid-elbow-down",
         "friction",
@@ -59,10 +59,10 @@ fn an_arm_that_has_changed_since_it_was_identified_is_told() {
     let has_changed = |seed: &str, length: &[&str]| {
         let line = [
             "identify",
-            "out/identified.toml",
+            "out/rehearsed.toml",
             "--rehearse",
             "--output",
-            "out/identified-again.toml",
+            "out/rehearsed-again.toml",
             "--seed",
             seed,
         ];
@@ -73,6 +73,30 @@ fn an_arm_that_has_changed_since_it_was_identified_is_told() {
     assert!(has_changed("4", &[]));
     assert!(!has_changed("3", &[]));
     assert!(!has_changed("3", &["--link-1-m", "0.2105"]));
+}
+
+#[test]
+fn a_length_that_no_drawing_explains_is_told() {
+    let bench = Bench::new("identify-length");
+    let warns = |length_m: &str| {
+        let run = bench.run(&["identify", "--rehearse", "--link-1-m", length_m]);
+        errors(&run).contains("measure link 1 again")
+    };
+    assert!(warns("0.2163"));
+    assert!(!warns("0.2105"));
+}
+
+#[test]
+fn a_rehearsals_scenario_drives_no_real_arm() {
+    let bench = Bench::new("rehearsed");
+    let rehearsal = bench.run(&["commission", "--rehearse"]);
+    assert!(rehearsal.status.success(), "{}", errors(&rehearsal));
+    for command in ["drive", "identify"] {
+        let refused = bench.run(&[command, "out/rehearsed.toml", "--port", "/dev/null"]);
+        assert_eq!(code(refused.status), 2, "{}", errors(&refused));
+        let reason = "describes a simulated arm (knowledge.source: rehearsal with seed 1)";
+        assert!(errors(&refused).contains(reason), "{}", errors(&refused));
+    }
 }
 
 /// Records a slide of an arm with friction that its controller does not know; returns the file.
@@ -124,6 +148,13 @@ fn records_of_slides_show_an_arm() {
     assert_eq!(code(refused.status), 2, "{}", errors(&refused));
     let reason = "elbow-down.mcap: its converters.force.range_n is 20.0, that of the scenario 30.0";
     assert!(errors(&refused).contains(reason), "{}", errors(&refused));
+    let slower = bench.run(&[&line[..], &["--set", "run.tick_hz=500"]].concat());
+    assert_eq!(code(slower.status), 2, "{}", errors(&slower));
+    assert!(
+        errors(&slower).contains("its run.tick_hz is 1000"),
+        "{}",
+        errors(&slower)
+    );
     // Told the wrong posture, it writes nothing, and says that the files are not of this run.
     let before = std::fs::read(bench.path("out/identified.toml")).unwrap();
     let swapped = ["elbow-up=elbow-down.mcap", "elbow-down=up.csv"];

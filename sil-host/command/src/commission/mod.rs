@@ -8,8 +8,12 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use painleve_commission::second_sensors::{self, SecondSensors};
 use painleve_commission::simulated::{BuiltInMistake, SimulatedRig};
-use painleve_commission::{CommissionError, Commissioned, Deviation, Expected, commission};
+use painleve_commission::{
+    CommissionError, Commissioned, Deviation, Expected, NoSlide, commission,
+};
 use painleve_files::atomic_file;
+use painleve_plant::decimal::as_written;
+use painleve_plant::scenario::knowledge::REHEARSAL;
 use painleve_plant::scenario::{Scenario, ScenarioError, built_in};
 use painleve_shared::mounting::SensorParts;
 use painleve_shared::range::OutOfRange;
@@ -46,12 +50,13 @@ pub struct CommissionArguments {
     /// With --rehearse: seed of the simulated operator's hands and of the noise; by default 1.
     #[arg(long, value_parser = painleve_study_core::options::seed)]
     seed: Option<u64>,
-    /// Largest torque on either joint, N·m; by default, a fifth of the torque stages' range.
+    /// Largest torque on either joint, N·m; by default, a fifth of the torque stages' range, or controller.torque_limit_nm
+    /// if that is less.
     #[arg(long, value_name = "N·m")]
     torque_limit_nm: Option<f64>,
-    /// File for the corrected scenario.
-    #[arg(long, value_name = "PATH", default_value = "out/commissioned.toml")]
-    output: PathBuf,
+    /// File for the corrected scenario; by default out/commissioned.toml, and out/rehearsed.toml with --rehearse.
+    #[arg(long, value_name = "PATH")]
+    output: Option<PathBuf>,
     /// Print one JSON object on stdout instead of the text.
     #[arg(long)]
     json: bool,
@@ -101,20 +106,28 @@ pub fn run(arguments: &CommissionArguments) -> Result<(), CommandError> {
     };
     let torque_limit_nm = torque_limit_nm(arguments, &scenario).map_err(range)?;
     let expected = Expected::new(&scenario, torque_limit_nm).map_err(range)?;
-    distinct_files::check(&[("--output", &arguments.output)])?;
+    let output_path = arguments.output.clone().unwrap_or_else(|| {
+        let name = if arguments.rehearse {
+            "rehearsed"
+        } else {
+            "commissioned"
+        };
+        format!("out/{name}.toml").into()
+    });
+    distinct_files::check(&[("--output", &output_path)])?;
     let commissioned = match &arguments.port {
         None => rehearse(arguments, &scenario, &expected),
         Some(port) => on_board(port, &scenario, &expected),
     }
-    .inspect_err(|_| warn_of_earlier(&[&arguments.output]))
+    .inspect_err(|_| warn_of_earlier(&[&output_path]))
     .map_err(|error| match error {
         CommissionError::Rig(error) => error,
         CommissionError::Refused(mistake) => CommandError::Mounting(mistake),
         CommissionError::Range(source) => range(source),
     })?;
-    let (corrected, deviations) = if arguments.second_sensors {
+    let (mut corrected, deviations) = if arguments.second_sensors {
         let found = SecondSensors::new(&commissioned, &as_written).map_err(|mistake| {
-            warn_of_earlier(&[&arguments.output]);
+            warn_of_earlier(&[&output_path]);
             CommandError::Mounting(mistake)
         })?;
         (found.applied_to(&as_written), found.deviations)
@@ -122,19 +135,23 @@ pub fn run(arguments: &CommissionArguments) -> Result<(), CommandError> {
         let corrected = commissioned.applied_to(&as_written).map_err(range)?;
         (corrected, commissioned.deviations)
     };
+    if arguments.rehearse {
+        let seed = arguments.seed.unwrap_or(1);
+        corrected.knowledge.source = format!("{REHEARSAL} with seed {seed}");
+    }
     let text = corrected.to_commented_toml();
-    atomic_file::write(&arguments.output, text.as_bytes()).map_err(output)?;
-    report(arguments, &deviations, commissioned.friction)?;
+    atomic_file::write(&output_path, text.as_bytes()).map_err(output)?;
+    report(arguments, &output_path, &deviations, commissioned.friction)?;
     let sensors = corrected.converters.mounting.sensors;
     if sensors == SensorParts::Both && !arguments.second_sensors && !arguments.json {
-        let scenario = arguments.output.display();
+        let scenario = output_path.display();
         let rig = match &arguments.port {
             Some(port) => format!("--port {}", port.display()),
             None => "--rehearse".to_owned(),
         };
         say(format_args!(
             "next, the second sensors: painleve commission {scenario} {rig} --second-sensors --output {}",
-            arguments.output.with_extension("second.toml").display()
+            output_path.with_extension("second.toml").display()
         ))?;
     }
     Ok(())
@@ -167,9 +184,10 @@ fn torque_limit_nm(
     scenario: &Scenario,
 ) -> Result<f64, OutOfRange> {
     let range_nm = scenario.converters.torque.range_nm;
-    let limit_nm = arguments
-        .torque_limit_nm
-        .unwrap_or(DEFAULT_SHARE * range_nm);
+    let limit_nm = arguments.torque_limit_nm.unwrap_or_else(|| {
+        let own_nm = as_written(scenario.controller.torque_limit_nm);
+        (DEFAULT_SHARE * range_nm).min(own_nm)
+    });
     painleve_shared::range::check("--torque-limit-nm", limit_nm, 1e-3, range_nm)?;
     Ok(limit_nm)
 }
@@ -177,8 +195,9 @@ fn torque_limit_nm(
 /// Prints what was found and where the corrected scenario is.
 fn report(
     arguments: &CommissionArguments,
+    output_path: &Path,
     deviations: &[Deviation],
-    friction: Option<f64>,
+    friction: Result<f64, NoSlide>,
 ) -> Result<(), CommandError> {
     // The file of second sensors keeps the friction that the first ones have shown.
     let writes_friction = !arguments.second_sensors;
@@ -186,10 +205,10 @@ fn report(
         let corrections = deviations.iter().map(ToString::to_string);
         let mut object = json!({
             "corrections": corrections.collect::<Vec<_>>(),
-            "output": arguments.output.display().to_string(),
+            "output": output_path.display().to_string(),
         });
         if writes_friction {
-            object["friction"] = friction.into();
+            object["friction"] = friction.ok().into();
         }
         return say(object);
     }
@@ -201,12 +220,12 @@ fn report(
     }
     match friction {
         _ if !writes_friction => {}
-        Some(friction) => say(format_args!(
+        Ok(friction) => say(format_args!(
             "friction of the tip on the belt: {friction:.2}"
         ))?,
-        None => say(
-            "friction of the tip on the belt: not measured; it did not slide within --torque-limit-nm",
-        )?,
+        Err(reason) => say(format_args!(
+            "friction of the tip on the belt: not measured; {reason}"
+        ))?,
     }
-    say(format_args!("written: {}", arguments.output.display()))
+    say(format_args!("written: {}", output_path.display()))
 }

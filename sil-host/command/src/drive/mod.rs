@@ -11,8 +11,9 @@ use std::time::{Duration, Instant};
 use clap::Args;
 use painleve_board::BoardError;
 use painleve_board::arm::{ArmEvent, ConnectedArm, Measured};
-use painleve_commission::set_down;
+use painleve_commission::{identification, set_down};
 use painleve_files::input_file;
+use painleve_plant::scenario::knowledge::REHEARSAL;
 use painleve_plant::scenario::{Scenario, ScenarioError, built_in};
 use painleve_process::interrupt::Interrupt;
 use painleve_process::terminal::warn;
@@ -29,7 +30,7 @@ pub use self::operator::{Ended, Operator};
 use self::view::View;
 use super::distinct_files::check_distinct;
 use super::output::keep_partial;
-use super::output_error::output;
+use super::output_error::{InputError, output};
 use super::process_error::ProcessError;
 use super::{CommandError, say};
 
@@ -180,6 +181,9 @@ impl Drive {
         } else {
             FrameSource::Sensors
         };
+        if !arguments.dry_run {
+            check_commissioned(scenario)?;
+        }
         let arm = ConnectedArm::open(&arguments.port, &configuration, source)?;
         warn_of_single_sensors(scenario);
         if let Err(error) = arm.compare_sources() {
@@ -310,6 +314,24 @@ pub(crate) fn check_rate(scenario: &Scenario) -> Result<(), ScenarioError> {
     let hz = f64::from(scenario.run.tick_hz);
     range::check("run.tick_hz", hz, 1.0, fastest_hz)
         .map_err(|source| ScenarioError::range(&scenario.name, source))
+}
+
+/// Refuses a scenario that has been written in a rehearsal, and warns of one that has not been commissioned: the directions of
+/// the real arm's parts may be others.
+///
+/// # Errors
+/// [`InputError::Rehearsed`].
+pub(crate) fn check_commissioned(scenario: &Scenario) -> Result<(), InputError> {
+    if scenario.knowledge.source.starts_with(REHEARSAL) {
+        return Err(InputError::Rehearsed(scenario.knowledge.source.clone()));
+    }
+    if identification::is_new(scenario) {
+        warn(
+            "this scenario has never been commissioned: if a sensor or a stage is mounted in the other direction, the feedback is \
+             positive; measure the arm with painleve commission first",
+        );
+    }
+    Ok(())
 }
 
 /// Tells the operator of an arm with one sensor on each channel what the board cannot detect within two ticks.

@@ -18,6 +18,8 @@ use painleve_commission::simulated::{GeometryMistake, SimulatedSlides, imperfect
 use painleve_files::atomic_file::{commit_all, prepare};
 use painleve_identify::parameters::Drawn;
 use painleve_identify::{Parameters, Slide};
+use painleve_plant::decimal::as_written;
+use painleve_plant::scenario::knowledge::REHEARSAL;
 use painleve_plant::scenario::{Scenario, ScenarioError, built_in};
 use painleve_process::terminal::{self, warn};
 use painleve_shared::Posture;
@@ -26,7 +28,7 @@ use serde_json::json;
 
 use self::board_slides::BoardSlides;
 use self::recorded::Recorded;
-use super::drive::check_rate;
+use super::drive::{check_commissioned, check_rate};
 use super::output::warn_of_earlier;
 use super::output_error::{InputError, output};
 use super::{CommandError, distinct_files, say};
@@ -36,6 +38,9 @@ const MEASURED_M: f64 = 1e-4;
 
 /// Lengths that a scenario's `arm.link_length_m` may have, m.
 const LINK_LENGTH_M: RangeInclusive<f64> = 0.01..=10.0;
+
+/// Standard deviations of a drawing's length from which a measured one is suspicious.
+const TOLERANCE: f64 = 3.0;
 
 /// A later distance from the line beyond this multiple of the one written down shows that the arm has changed.
 const CHANGED: f64 = 2.0;
@@ -69,12 +74,13 @@ pub struct IdentifyArguments {
     /// 0.6 %. A line has no scale: positions are as exact as this length.
     #[arg(long, value_name = "M", value_parser = link_length_m)]
     link_1_m: Option<f64>,
-    /// File for the scenario with the measured values.
-    #[arg(long, value_name = "PATH", default_value = "out/identified.toml")]
-    output: PathBuf,
-    /// Report page, with the tip's distances from the line before and after.
-    #[arg(long, value_name = "PATH", default_value = "out/identified.html")]
-    html: PathBuf,
+    /// File for the scenario with the measured values; by default out/identified.toml, and out/rehearsed.toml with --rehearse.
+    #[arg(long, value_name = "PATH")]
+    output: Option<PathBuf>,
+    /// Report page, with the tip's distances from the line before and after; by default out/identified.html, and
+    /// out/rehearsed.html with --rehearse.
+    #[arg(long, value_name = "PATH")]
+    html: Option<PathBuf>,
     /// Print one JSON object on stdout instead of the text.
     #[arg(long)]
     json: bool,
@@ -107,16 +113,31 @@ pub fn run(arguments: &IdentifyArguments) -> Result<(), CommandError> {
         .map(|it| it.read(&scenario))
         .collect();
     let slides = recorded?;
-    distinct_files::check(&[("--output", &arguments.output), ("--html", &arguments.html)])?;
+    let stem = match arguments.rehearse {
+        true => "out/rehearsed",
+        false => "out/identified",
+    };
+    let (output_path, html_path) = (
+        arguments
+            .output
+            .clone()
+            .unwrap_or_else(|| format!("{stem}.toml").into()),
+        arguments
+            .html
+            .clone()
+            .unwrap_or_else(|| format!("{stem}.html").into()),
+    );
+    distinct_files::check(&[("--output", &output_path), ("--html", &html_path)])?;
     let mut drawn = Drawn::default();
     let written = prior(&scenario, &drawn).parameters;
     if let Some(length_m) = arguments.link_1_m {
         let mut arm = scenario.controller_configuration().arm;
+        warn_of_length(length_m, as_written(arm.link_length_m[0]), drawn.length);
         arm.link_length_m[0] = length_m as f32;
         scenario.arm_model = Some(arm);
         drawn.length = MEASURED_M / length_m;
     }
-    let warn_of_earlier = |_: &CommandError| warn_of_earlier(&[&arguments.output, &arguments.html]);
+    let warn_of_earlier = |_: &CommandError| warn_of_earlier(&[&output_path, &html_path]);
     let found = found(arguments, &slides, &scenario, &drawn);
     let (found, source) = found.inspect_err(warn_of_earlier)?;
     warn_of_change(&scenario, &written, &found);
@@ -128,11 +149,22 @@ pub fn run(arguments: &IdentifyArguments) -> Result<(), CommandError> {
     let place = advice(&identified).map_err(|error| range(&arguments.scenario, error))?;
     let page = report::html(&identified.name, &found, &place);
     commit_all(vec![
-        prepare(&arguments.output, text.as_bytes()).map_err(output)?,
-        prepare(&arguments.html, page.as_bytes()).map_err(output)?,
+        prepare(&output_path, text.as_bytes()).map_err(output)?,
+        prepare(&html_path, page.as_bytes()).map_err(output)?,
     ])
     .map_err(output)?;
-    report(arguments, &found, &identified, &place)
+    let written = [output_path, html_path].map(|path| path.display().to_string());
+    report(arguments, &found, &identified, &place, &written)
+}
+
+/// Warns if a measured length differs from that of the scenario by more than a drawing's tolerance explains: all positions
+/// are as wrong as this length.
+fn warn_of_length(measured_m: f64, drawn_m: f64, deviation: f64) {
+    if (measured_m / drawn_m - 1.0).abs() > TOLERANCE * deviation {
+        warn(format_args!(
+            "--link-1-m is {measured_m} m, but the scenario says {drawn_m} m: measure link 1 again, from joint to joint"
+        ));
+    }
 }
 
 /// Returns the result and where it comes from.
@@ -150,6 +182,7 @@ fn found(
     }
     if let Some(port) = &arguments.port {
         check_rate(scenario)?;
+        check_commissioned(scenario)?;
         let found = on_board(port, scenario, drawn);
         let found = found.map_err(|error| failed(name, error, CommandError::from))?;
         return Ok((found, format!("slides of the arm at {}", port.display())));
@@ -161,7 +194,7 @@ fn found(
     let mut rig = SimulatedSlides::new(actual, mistake.copied());
     let found = identify_arm(&mut rig, scenario, drawn)
         .map_err(|error| failed(name, error, |error| CommandError::Input(error.into())))?;
-    Ok((found, format!("rehearsal with seed {seed}")))
+    Ok((found, format!("{REHEARSAL} with seed {seed}")))
 }
 
 /// Identifies the arm behind a board; whatever ends it, the torque is off.
@@ -217,12 +250,12 @@ fn report(
     found: &Found,
     identified: &Scenario,
     place: &str,
+    [output, html]: &[String; 2],
 ) -> Result<(), CommandError> {
-    let (output, html) = (arguments.output.display(), arguments.html.display());
     if arguments.json {
         let mut object = report::json(found);
-        object["output"] = output.to_string().into();
-        object["html"] = html.to_string().into();
+        object["output"] = output.as_str().into();
+        object["html"] = html.as_str().into();
         for (key, posture) in [
             ("elbow_down", Posture::ElbowDown),
             ("elbow_up", Posture::ElbowUp),

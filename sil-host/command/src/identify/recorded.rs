@@ -28,14 +28,15 @@ const COLUMNS: [&str; 6] = [
     "actuator.u2_counts",
 ];
 
-/// Keys that say what the counts of these columns mean.
-const SCALES: [&str; 6] = [
+/// Keys that say what the counts and ticks of these columns mean.
+const SCALES: [&str; 7] = [
     "converters.encoder.bits",
     "converters.encoder.offset_counts",
     "converters.force.bits",
     "converters.force.range_n",
     "converters.torque.bits",
     "converters.torque.range_nm",
+    "run.tick_hz",
 ];
 
 /// Column with the control tick; the rows of a table without it are counted.

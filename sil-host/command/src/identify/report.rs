@@ -84,6 +84,7 @@ pub fn json(found: &Found) -> Value {
         "tip_deviation_before_m": found.prior.tip_deviation_m(),
         "place_deviation_m": identified.place_deviation_m,
         "off_line_m": identified.off_line_m,
+        "ripple_m_s2": found.ripple_m_s2,
         "readings": identified.readings,
     })
 }
@@ -97,7 +98,8 @@ fn sentences(found: &Found) -> Vec<String> {
             1e3 * after_nm,
             1e3 * before_nm
         ),
-        None => "The torques show nothing: no joint has turned far enough in one direction.".into(),
+        None => "The torques show nothing of friction and springs: in no tenth of a second has a joint turned far enough in one direction with the tip on the belt. What the scenario says of them stays."
+            .into(),
     };
     let length = identified.fit.parameters.get(Parameter::Length);
     let length_deviation = identified.fit.deviation(Parameter::Length) / length;
@@ -117,6 +119,11 @@ fn sentences(found: &Found) -> Vec<String> {
             1e3 * found.prior.tip_deviation_m()
         ),
         of_torques,
+        format!(
+            "Waves, vibration and unknown torques accelerate the tip off the belt by {:.2} m/s² (root mean square), of which \
+             controller.governor.p_per_kg follows.",
+            found.ripple_m_s2
+        ),
     ];
     for (joint, name) in found.joints.joints.iter().zip(JOINT_NAMES) {
         if joint.drives_itself() {

@@ -18,7 +18,7 @@ use painleve_commission::simulated::{
 };
 use painleve_firmware::law::LawSettings;
 use painleve_identify::parameters::Drawn;
-use painleve_identify::torques::{Estimate, Joints};
+use painleve_identify::torques::{Estimate, Joint, Joints};
 use painleve_identify::{Parameter, Reading, Refusal};
 use painleve_plant::Plant;
 use painleve_plant::mechanics::BuiltInPlant;
@@ -171,6 +171,20 @@ fn a_value_that_is_not_taken_or_that_no_controller_takes_leaves_what_was_known()
         .knowledge
         .coulomb_friction_nm;
     assert!(one_nm == 0.0 && two_nm > 0.0, "{one_nm} {two_nm}");
+    // Torques that show nothing give estimates of zero with deviations of zero.
+    let nothing = Estimate {
+        value: 0.0,
+        deviation: 0.0,
+    };
+    found.joints.joints = found.joints.joints.map(|joint| Joint {
+        friction_nm: nothing,
+        ..joint
+    });
+    found.joints.left_over_nm = None;
+    assert_eq!(
+        found.applied_to(&known, "").unwrap().arm_model,
+        known.arm_model
+    );
     let zero = Parameter::Zero(1);
     found.identified.fit.parameters.set(zero, 0.25);
     let refusal = found.applied_to(&scenario, "").unwrap_err().to_string();

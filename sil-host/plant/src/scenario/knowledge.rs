@@ -2,6 +2,9 @@
 
 use painleve_shared::settings;
 
+/// Beginning of the source of a scenario that a simulated arm has been measured for: it describes no real arm.
+pub const REHEARSAL: &str = "rehearsal";
+
 settings! {
     /// Standard deviations of an arm's geometry and joints, as `painleve identify` has written them: a record of how the arm is
     /// known. The values are in `arm_model` and `controller.estimator.encoders`. The controller needs what follows from
@@ -23,7 +26,7 @@ settings! {
         tip_m: f64 = 0.0, 0.0..=1.0, "m";
         /// Part of `controller.estimator.tip_deviation_m` that you set, such as for play of the gears. Once the arm is
         /// commissioned or identified, change this key only: commands compute the other.
-        told_m: f64 = 0.0, 0.0..=0.1, "m";
+        told_m: f64 = 0.0, 0.0..=1.0, "m";
         /// Distance of the tip from a straight line in the slides, root mean square.
         off_line_m: f64 = 0.0, 0.0..=1.0, "m";
         /// Acceleration of the tip off the belt by waves, vibration and torques that the controller does not know, root mean
