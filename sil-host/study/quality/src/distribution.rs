@@ -6,8 +6,6 @@ use serde::Serialize;
 
 /// Number of bars of a histogram.
 const BARS: usize = 60;
-/// Width of a bar in drawn units; bars are about 29 apart.
-const BAR_WIDTH: u32 = 25;
 
 /// Percentiles of a set of values.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -65,19 +63,17 @@ pub fn histogram(
         let bin = (value / width).max(0.0) as usize;
         counts[bin.min(BARS - 1)] += 1;
     }
-    let mut points = Vec::with_capacity(3 * BARS);
-    for (bin, count) in counts.iter().enumerate().filter(|(_, count)| **count > 0) {
-        let middle = (bin as f64 + 0.5) * width;
-        points.extend([(middle, 0.0), (middle, f64::from(*count)), (f64::NAN, 0.0)]);
-    }
+    let filled = counts.iter().enumerate().filter(|(_, count)| **count > 0);
+    let bars = filled.map(|(bin, count)| {
+        let left = bin as f64 * width;
+        (left..left + width, 0.0..f64::from(*count))
+    });
     let highest = counts.iter().copied().max().unwrap_or(0).max(1);
     let top = 1.08 * f64::from(highest);
-    let bars = Mark::Line {
+    let bars = Mark::Bars {
         name: String::new(),
         colour,
-        width: BAR_WIDTH,
-        dashed: false,
-        points,
+        bars: bars.collect(),
     };
     Panel {
         title: title.into(),
@@ -115,11 +111,10 @@ mod tests {
             5.0,
             &[0.0, 0.05, 9.0],
         );
-        let Mark::Line { points, .. } = &panel.marks[0] else {
-            panic!("no line");
+        let Mark::Bars { bars, .. } = &panel.marks[0] else {
+            panic!("no bars");
         };
-        assert_eq!(points[..2], [(0.05, 0.0), (0.05, 2.0)]);
-        assert_eq!(points[3..5], [(5.95, 0.0), (5.95, 1.0)]);
-        assert_eq!(points.len(), 6);
+        let last = 59.0 * 0.1;
+        assert_eq!(bars, &[(0.0..0.1, 0.0..2.0), (last..last + 0.1, 0.0..1.0)]);
     }
 }

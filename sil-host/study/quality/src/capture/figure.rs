@@ -4,8 +4,8 @@ use painleve_chart::Chart;
 use painleve_chart::style::BLUE_INK;
 use painleve_study_core::outcome::Figure;
 
-use super::LIMIT_S;
 use super::outcome::Captures;
+use super::{LIMIT_S, WITHIN_M};
 use crate::distribution::histogram;
 
 impl Figure for Captures {
@@ -16,8 +16,9 @@ impl Figure for Captures {
         Chart {
             title: "Capture of the bouncing arm".into(),
             subtitle: format!(
-                "captured within {LIMIT_S} s and kept on the belt: {}",
-                self.success
+                "{}: last landing within {LIMIT_S} s,\nat the end within {} mm of the reference, without a fault",
+                self.success,
+                1e3 * WITHIN_M
             ),
             x_title: "Time from enabling to the last landing (s)".into(),
             x: Some(0.0..0.6),
