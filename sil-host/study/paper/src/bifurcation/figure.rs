@@ -43,14 +43,25 @@ fn chart(diagram: &BifurcationDiagram) -> Chart {
             panels: vec![section(diagram, &groups), apexes(diagram, &groups)],
             ..Chart::default()
         },
-        _ => Chart {
-            title: "Bifurcation diagram over belt speed and friction".into(),
-            subtitle: format!("no control, {watched}; dashed: bouncing in the paper"),
-            x_title: "Belt speed v_belt (m/s)".into(),
-            x: Some(Places::of(&diagram.settings().v_belt_m_s).ends()),
-            panels: groups.iter().map(|group| map(diagram, group)).collect(),
-            ..Chart::default()
-        },
+        _ => {
+            let values: Vec<Vec<f64>> = groups
+                .iter()
+                .map(|group| strongest(diagram, group))
+                .collect();
+            // One range of colours, so that the panels can be compared.
+            let (palette, cells) = shades(&values.concat());
+            let cells = cells.chunks(values[0].len());
+            let panels = groups.iter().zip(cells);
+            let panels = panels.map(|(group, cells)| map(diagram, group, &palette, cells));
+            Chart {
+                title: "Bifurcation diagram over belt speed and friction".into(),
+                subtitle: format!("no control, {watched}; dashed: bouncing in the paper"),
+                x_title: "Belt speed v_belt (m/s)".into(),
+                x: Some(Places::of(&diagram.settings().v_belt_m_s).ends()),
+                panels: panels.collect(),
+                ..Chart::default()
+            }
+        }
     }
 }
 
@@ -134,27 +145,37 @@ fn without_name(mut mark: Mark) -> Mark {
     mark
 }
 
-fn map(diagram: &BifurcationDiagram, group: &str) -> Panel {
+/// Returns the largest θ̇₁ of each cell of a map; minus infinity where nothing bounces.
+fn strongest(diagram: &BifurcationDiagram, group: &str) -> Vec<f64> {
     let settings = diagram.settings();
     let (columns, lines) = (Places::of(&settings.v_belt_m_s), Places::of(&settings.mu));
-    let strongest = |mu: usize, speed: usize| {
+    let of_cell = |mu: usize, speed: usize| {
         let rows = diagram.at(mu, speed, group).filter(|row| row.bouncing);
         let speeds = rows.map(|row| row.max_theta1_dot_rad_s);
         speeds.fold(f64::NEG_INFINITY, f64::max)
     };
-    let values: Vec<f64> = lines
+    lines
         .nearest
         .iter()
         .flat_map(|&mu| columns.nearest.iter().map(move |&speed| (mu, speed)))
-        .map(|(mu, speed)| strongest(mu, speed))
-        .collect();
-    let (palette, cells) = shades(&values);
+        .map(|(mu, speed)| of_cell(mu, speed))
+        .collect()
+}
+
+fn map(
+    diagram: &BifurcationDiagram,
+    group: &str,
+    palette: &[(String, Colour)],
+    cells: &[u8],
+) -> Panel {
+    let settings = diagram.settings();
+    let (columns, lines) = (Places::of(&settings.v_belt_m_s), Places::of(&settings.mu));
     let mut marks = vec![Mark::Cells {
         x: columns.ends(),
         y: lines.ends(),
         columns: columns.nearest.len(),
-        palette,
-        cells,
+        palette: palette.to_vec(),
+        cells: cells.to_vec(),
     }];
     let paper = diagram
         .windows
@@ -202,4 +223,53 @@ fn shades(values: &[f64]) -> (Vec<(String, Colour)>, Vec<u8>) {
     };
     let cells = values.iter().map(place).collect();
     (palette, cells)
+}
+
+#[cfg(test)]
+mod tests {
+    use painleve_plant::mechanics::PlantParameters;
+    use painleve_study_core::initial::Initial;
+
+    use super::*;
+    use crate::bifurcation::Bifurcation;
+    use crate::cells::RELATIVE_TOLERANCE;
+
+    #[test]
+    fn a_colour_means_the_same_in_every_panel() {
+        let study = Bifurcation {
+            cells: Cells {
+                plant: PlantParameters::default(),
+                relative_tolerance: RELATIVE_TOLERANCE,
+                mu: vec![0.4, 0.6],
+                v_belt_m_s: vec![-0.5, -0.4],
+                initial: vec![Initial::A, Initial::D],
+                seed: 1,
+                transient_s: 1.0,
+                record_s: 1.0,
+            },
+        };
+        let rows = (0..8).map(|index| Row {
+            mu: 0.4,
+            v_belt_m_s: -0.4,
+            initial: "a".into(),
+            // From x0,d three times as fast as from x0,a.
+            max_theta1_dot_rad_s: if index % 2 == 0 { 4.0 } else { 12.0 },
+            bouncing: true,
+            contact_fraction: 0.5,
+            apex_m: 0.01,
+            impacts_per_s: 5.0,
+            start_theta1_deg: 32.0,
+            start_theta2_deg: 18.0,
+            start_theta1_dot_rad_s: 0.0,
+            start_theta2_dot_rad_s: 0.0,
+        });
+        let diagram = BifurcationDiagram::new(&study, rows.collect());
+        let panels = chart(&diagram).panels;
+        let [one, other] = [0, 1].map(|panel: usize| match &panels[panel].marks[0] {
+            Mark::Cells { palette, cells, .. } => (palette, cells[0]),
+            mark => panic!("{mark:?}"),
+        });
+        assert_eq!(one.0, other.0);
+        assert_ne!(one.1, other.1);
+    }
 }
