@@ -6,6 +6,7 @@ use clap::{Args, ValueEnum};
 use painleve_files::input_file;
 use painleve_link::Pacing;
 use painleve_plant::scenario::{Scenario, built_in};
+use painleve_study_core::outcome::quoted;
 use painleve_study_quality::robustness::{self, Arms};
 use serde::{Deserialize, Serialize};
 use tempfile::NamedTempFile;
@@ -146,10 +147,4 @@ fn temporary_file(text: &[u8]) -> io::Result<NamedTempFile> {
 /// Returns the option that overrides a key, for a shell, on a line of its own.
 pub fn set_option(text: &str) -> String {
     format!(" \\\n    --set {}", quoted(text))
-}
-
-/// Returns a text as one word of a shell.
-fn quoted(text: &str) -> String {
-    // A single quote ends the shell's quotation.
-    format!("'{}'", text.replace('\'', "'\\''"))
 }

@@ -35,6 +35,12 @@ pub fn csv(outcome: &impl Outcome) -> Result<Vec<u8>, csv::Error> {
 
 pub use painleve_process::terminal::table;
 
+/// Returns a text as one word of a shell.
+pub fn quoted(text: &str) -> String {
+    // A single quote ends the shell's quotation.
+    format!("'{}'", text.replace('\'', "'\\''"))
+}
+
 /// The name under which a value is serialised.
 pub fn name(value: &impl Serialize) -> String {
     match serde_json::to_value(value) {

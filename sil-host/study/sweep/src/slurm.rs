@@ -2,6 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
+use painleve_study_core::outcome::quoted;
+
 /// Settings of the job script.
 #[derive(Clone, Debug)]
 pub struct Job<'a> {
@@ -73,11 +75,6 @@ impl Job<'_> {
              exec {program} sweep run --folder {folder} --threads \"${{SLURM_CPUS_PER_TASK:-1}}\"\n"
         ))
     }
-}
-
-/// Quotes a word for the shell.
-fn quoted(text: &str) -> String {
-    format!("'{}'", text.replace('\'', r"'\''"))
 }
 
 #[cfg(test)]

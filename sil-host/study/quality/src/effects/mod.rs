@@ -92,8 +92,8 @@ pub struct Row {
     pub p_ratio: f64,
     /// Final tip position, m.
     pub tip_t_m: f64,
-    /// Target of the reference, m.
-    pub target_m: f64,
+    /// Target of the reference, m; null without one.
+    pub target_m: Option<f64>,
     /// Initial posture.
     pub posture: Posture,
     /// Friction coefficient μ of the belt.

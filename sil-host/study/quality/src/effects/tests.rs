@@ -193,7 +193,7 @@ fn the_table_interpolates_between_levels() {
             to_edge_m: 2e-3,
             p_ratio: 0.5,
             tip_t_m: 0.1,
-            target_m: 0.1,
+            target_m: Some(0.1),
             posture: Posture::ElbowUp,
             mu: 0.6,
             v_belt_m_s: 0.4,

@@ -10,28 +10,27 @@ use super::outcome::RobustnessOutcome;
 use super::{Criterion, Row};
 use crate::proportion::Proportion;
 
-/// Number of bins of a factor.
-const BINS: usize = 8;
-
-/// A factor of the campaign: its name and unit, its range and its value in a run.
-type Factor = (&'static str, Range<f64>, fn(&Row) -> f64);
+/// A factor of the campaign: its name and unit, its range, the number of its bins and its value in a run.
+type Factor = (&'static str, Range<f64>, usize, fn(&Row) -> f64);
 
 /// The factors shown, which are drawn independently of each other.
 const FACTORS: [Factor; 8] = [
-    ("Friction μ", 0.2..1.0, |row| row.mu),
-    ("Belt speed (m/s)", -1.0..1.0, |row| row.v_belt_m_s),
-    ("Control rate (kHz)", 0.5..5.0, |row| {
+    ("Friction μ", 0.2..1.0, 8, |row| row.mu),
+    ("Belt speed (m/s)", -1.0..1.0, 8, |row| row.v_belt_m_s),
+    ("Control rate (kHz)", 0.5..5.0, 8, |row| {
         1e-3 * f64::from(row.tick_hz)
     }),
-    ("Encoder (bits)", 11.5..18.5, |row| {
+    ("Encoder (bits)", 11.5..18.5, 7, |row| {
         f64::from(row.encoder_bits)
     }),
-    ("Delay (ticks)", 0.0..2.0, |row| row.delay_ticks),
-    ("Lag of the torque (ms)", 0.0..1.0, |row| {
+    ("Delay (ticks)", 0.0..2.0, 8, |row| row.delay_ticks),
+    ("Lag of the torque (ms)", 0.0..1.0, 8, |row| {
         1e3 * row.torque_lag_s
     }),
-    ("Noise of the force (N)", 0.0..0.1, |row| row.force_noise_n),
-    ("Lost frames (%)", 0.0..1.0, |row| 100.0 * row.frame_loss),
+    ("Noise of the force (N)", 0.0..0.1, 8, |row| {
+        row.force_noise_n
+    }),
+    ("Lost frames (%)", 0.0..1.0, 8, |row| 100.0 * row.frame_loss),
 ];
 
 impl Figure for RobustnessOutcome {
@@ -46,7 +45,7 @@ impl Figure for RobustnessOutcome {
         let y = (lowest - 0.5).max(0.0).floor()..100.0 + 0.02 * (100.0 - lowest).max(1.0);
         let panels = factors
             .iter()
-            .map(|(bins, (name, range, _))| panel(name, range, bins, &y, self.success.rate));
+            .map(|(bins, (name, range, ..))| panel(name, range, bins, &y, self.success.rate));
         Chart {
             title: "Robustness".into(),
             subtitle: format!(
@@ -63,12 +62,16 @@ impl Figure for RobustnessOutcome {
 }
 
 /// Returns the success in each bin of a factor that has runs, with the bin's middle.
-fn bins(rows: &[Row], (_, range, value): &Factor, criterion: Criterion) -> Vec<(f64, Proportion)> {
-    let width = (range.end - range.start) / BINS as f64;
-    let mut counts = [(0, 0); BINS];
+fn bins(
+    rows: &[Row],
+    (_, range, count, value): &Factor,
+    criterion: Criterion,
+) -> Vec<(f64, Proportion)> {
+    let width = (range.end - range.start) / *count as f64;
+    let mut counts = vec![(0, 0); *count];
     for row in rows {
         let bin = ((value(row) - range.start) / width).max(0.0) as usize;
-        let (successes, runs) = &mut counts[bin.min(BINS - 1)];
+        let (successes, runs) = &mut counts[bin.min(count - 1)];
         *successes += usize::from(criterion.holds(row.ending));
         *runs += 1;
     }
@@ -135,5 +138,19 @@ mod tests {
         let found = bins(&rows, &FACTORS[0], Criterion::Kept);
         let counts: Vec<_> = found.iter().map(|(_, p)| (p.successes, p.runs)).collect();
         assert_eq!(counts, [(1, 2), (1, 1)]);
+    }
+
+    #[test]
+    fn every_number_of_bits_has_a_bin() {
+        let rows: Vec<Row> = (12..=18)
+            .map(|encoder_bits| Row {
+                encoder_bits,
+                ..crate::robustness::tables::row(0, Ending::Reached, 0.0)
+            })
+            .collect();
+        let encoder = FACTORS.iter().find(|factor| factor.0 == "Encoder (bits)");
+        let found = bins(&rows, encoder.unwrap(), Criterion::Kept);
+        let middles: Vec<f64> = found.iter().map(|(middle, _)| *middle).collect();
+        assert_eq!(middles, [12.0, 13.0, 14.0, 15.0, 16.0, 17.0, 18.0]);
     }
 }

@@ -76,7 +76,6 @@ pub fn run<P: Plant>(
             of_governed_m = of_governed_m.max((tip_m - governed_m).abs());
         }
     }
-    let target_m = target_m.unwrap_or(f64::NAN);
     let bits = i32::from(scenario.converters.encoder.bits);
     let count_rad = libm::ldexp(core::f64::consts::TAU, -bits);
     let tolerance_m =
@@ -87,7 +86,7 @@ pub fn run<P: Plant>(
     // Of the arm as it stands, not as it would on the undeformed belt: 10 N press the tip 1 mm into a belt of 1e4 N/m,
     // which near the edge changes p/Q22 by a tenth.
     let p_ratio = p_ratio(&arm, &trial.theta_rad(), friction, slip);
-    let to_edge_m = if target_m > start_m {
+    let to_edge_m = if target_m.is_some_and(|target_m| target_m > start_m) {
         stretch.end - trial.tip_t_m()
     } else {
         trial.tip_t_m() - stretch.start

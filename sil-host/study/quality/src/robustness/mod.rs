@@ -30,7 +30,7 @@ pub(crate) use draw::Journey;
 pub use draw::scenario;
 pub use false_alarms::FalseAlarms;
 pub use judge::LiftOffRule;
-pub use options::{CampaignOptions, Options};
+pub use options::Options;
 pub use outcome::{Place, RobustnessOutcome};
 pub use part::Part;
 pub use row::{Criterion, Ending, Row};
@@ -89,15 +89,8 @@ impl LoopStudy for Robustness {
     }
 }
 
-/// Runs a scenario with one reference and judges how it ends; `index` is its number in its campaign.
-///
-/// # Errors
-/// [`StudyError`] if the scenario is invalid.
-pub fn run(index: usize, scenario: &Scenario) -> Result<Row, StudyError> {
-    run_on(BuiltInPlant::new(scenario)?, index, scenario)
-}
-
-/// Runs a scenario as [`run`] does, on any plant in its initial state.
+/// Runs a scenario with one reference, on a plant in its initial state, and judges how it ends; `index` is its number in
+/// its campaign.
 ///
 /// # Errors
 /// [`StudyError`] if the scenario is invalid.

@@ -3,45 +3,25 @@
 use clap::Args;
 use painleve_study_core::StudyError;
 use painleve_study_core::catalogue::{InShards, StudyOptions, in_shards};
-use painleve_study_core::options::RandomRuns;
+use painleve_study_core::options::{RandomRuns, once};
 
 use super::{Arms, Criterion, Part, Robustness, RobustnessOutcome, Row};
-
-/// Options of studies that run the campaign.
-#[derive(Debug, Args)]
-pub struct CampaignOptions {
-    /// Arms: the paper's arm with errors, or any arm, known to the controller.
-    #[arg(long, value_enum, default_value = "paper")]
-    arms: Arms,
-    /// Parts of the controller to switch off.
-    #[arg(long, value_name = "PARTS", value_enum, value_delimiter = ',')]
-    pub without: Vec<Part>,
-    /// What counts as a success: the tip was kept on the belt without a fault, or is also in place at the end.
-    #[arg(long, value_enum, default_value_t)]
-    criterion: Criterion,
-    #[command(flatten)]
-    runs: RandomRuns,
-}
-
-impl CampaignOptions {
-    /// Returns the campaign with every part of the controller.
-    pub fn campaign(&self) -> Robustness {
-        Robustness {
-            arms: self.arms,
-            seed: self.runs.seed,
-            criterion: self.criterion,
-            runs: self.runs.runs,
-            overrides: self.runs.overrides(),
-        }
-    }
-}
 
 /// A campaign of random arms, belts, converters and losses that the controller does not know.
 #[derive(Debug, Args)]
 #[command(mut_arg("runs", |runs| runs.default_value("10000")))]
 pub struct Options {
+    /// Arms: the paper's arm with errors, or any arm, known to the controller.
+    #[arg(long, value_enum, default_value = "paper")]
+    arms: Arms,
+    /// Parts of the controller to switch off.
+    #[arg(long, value_name = "PARTS", value_enum, value_delimiter = ',')]
+    without: Vec<Part>,
+    /// What counts as a success: the tip was kept on the belt without a fault, or is also in place at the end.
+    #[arg(long, value_enum, default_value_t)]
+    criterion: Criterion,
     #[command(flatten)]
-    campaign: CampaignOptions,
+    runs: RandomRuns,
 }
 
 impl StudyOptions for Options {
@@ -51,17 +31,22 @@ impl StudyOptions for Options {
     type Outcome = RobustnessOutcome;
 
     fn study(&self) -> Result<Robustness, StudyError> {
-        let parts = self.campaign.without.iter();
-        let parts = parts.flat_map(|part| part.without());
-        let mut overrides: Vec<String> = parts.map(ToString::to_string).collect();
-        let mut study = self.campaign.campaign();
-        overrides.append(&mut study.overrides);
-        study.overrides = overrides;
+        let parts = once(&self.without).into_iter().flat_map(Part::without);
+        let study = Robustness {
+            arms: self.arms,
+            seed: self.runs.seed,
+            criterion: self.criterion,
+            runs: self.runs.runs,
+            overrides: parts
+                .map(ToString::to_string)
+                .chain(self.runs.overrides())
+                .collect(),
+        };
         study.check()?;
         Ok(study)
     }
 
     fn outcome(study: &Robustness, rows: Vec<Row>) -> RobustnessOutcome {
-        RobustnessOutcome::new(study.arms, study.seed, study.criterion, rows)
+        RobustnessOutcome::new(study, rows)
     }
 }

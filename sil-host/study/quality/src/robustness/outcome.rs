@@ -6,7 +6,7 @@ use comfy_table::Table;
 use painleve_study_core::outcome::{self, Outcome};
 use serde::Serialize;
 
-use super::{Arms, Criterion, Ending, Row};
+use super::{Arms, Criterion, Ending, Robustness, Row};
 use crate::distribution::Percentiles;
 use crate::proportion::Proportion;
 
@@ -45,6 +45,8 @@ pub struct RobustnessOutcome {
     pub seed: u64,
     /// What counts as a success.
     pub criterion: Criterion,
+    /// Changes to every run, also those that switch parts off.
+    pub overrides: Vec<String>,
     /// Success rate.
     pub success: Proportion,
     /// Distance of the tip from the governed reference at the end of the runs in which it was kept, and how far before
@@ -70,8 +72,9 @@ pub struct RobustnessOutcome {
 }
 
 impl RobustnessOutcome {
-    /// Collects all rows.
-    pub fn new(arms: Arms, seed: u64, criterion: Criterion, rows: Vec<Row>) -> Self {
+    /// Collects all rows of a study.
+    pub fn new(study: &Robustness, rows: Vec<Row>) -> Self {
+        let criterion = study.criterion;
         let mut endings = BTreeMap::new();
         for row in &rows {
             *endings.entry(row.ending).or_insert(0) += 1;
@@ -87,9 +90,10 @@ impl RobustnessOutcome {
             Percentiles::of(kept.iter().filter_map(|row| value(row)).collect())
         };
         Self {
-            arms,
-            seed,
+            arms: study.arms,
+            seed: study.seed,
             criterion,
+            overrides: study.overrides.clone(),
             success: Proportion::new(succeeded.len(), rows.len()),
             place: Place::of(
                 rows.iter()
@@ -100,10 +104,22 @@ impl RobustnessOutcome {
             force_ripple_n: of(|row| row.force_ripple_n),
             endings,
             false_alarms: rows.iter().map(|row| row.false_alarms).sum(),
-            slid_h: rows.iter().map(|row| row.slid_s).sum::<f64>() / 3600.0,
+            slid_h: rows.iter().map(|row| row.slid_s).sum::<f64>() / 3600.0 + 0.0,
             worst: failed.iter().take(WORST).map(|row| row.index).collect(),
             rows,
         }
+    }
+
+    /// Returns the shell command that repeats a run, for any number of a run.
+    fn command(&self) -> String {
+        let mut command = format!("painleve run --replay {}:INDEX", self.seed);
+        if self.arms != Arms::Paper {
+            command += &format!(" --arms {}", outcome::name(&self.arms));
+        }
+        for text in &self.overrides {
+            command += &format!(" --set {}", outcome::quoted(text));
+        }
+        command
     }
 
     /// Returns the number of runs with this ending.
@@ -154,19 +170,18 @@ impl Outcome for RobustnessOutcome {
         }
         let alarms = format!("{} in {:.2} h", self.false_alarms, self.slid_h);
         table.add_row(["false alarms", &alarms, "", "", "", ""]);
-        let arms = match self.arms {
-            Arms::Paper => "",
-            Arms::General => " --arms general",
-        };
         for row in self.worst.iter().filter_map(|&index| self.rows.get(index)) {
             table.add_row([
                 outcome::name(&row.ending),
-                format!("--replay {}:{}{arms}", self.seed, row.index),
+                format!("run {}", row.index),
                 format!("{:.2}", row.mu),
                 format!("{:.2}", row.v_belt_m_s),
                 row.tick_hz.to_string(),
                 format!("{:.2}", 1e3 * row.error_m),
             ]);
+        }
+        if !self.worst.is_empty() {
+            table.add_row(["to repeat a run", &self.command(), "", "", "", ""]);
         }
         table
     }

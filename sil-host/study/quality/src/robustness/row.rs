@@ -100,8 +100,8 @@ pub struct Row {
     pub force_ripple_n: Option<f64>,
     /// Final tip position, m.
     pub tip_t_m: f64,
-    /// Target of the reference, m.
-    pub target_m: f64,
+    /// Target of the reference, m; null without one.
+    pub target_m: Option<f64>,
     /// Initial posture.
     pub posture: Posture,
     /// Friction coefficient μ.

@@ -2,7 +2,10 @@
 
 use crate::plain;
 use painleve_shared::Posture;
+use painleve_study_core::catalogue::StudyOptions;
+use painleve_study_core::tabular::Table;
 
+use super::tests::campaign;
 use super::*;
 
 pub(super) fn row(index: usize, ending: Ending, error_m: f64) -> Row {
@@ -25,7 +28,7 @@ pub(super) fn row(index: usize, ending: Ending, error_m: f64) -> Row {
         torque_change_holding_nm: Some(0.02 * number),
         force_ripple_n: is_captured.then_some(0.03),
         tip_t_m: 0.1,
-        target_m: 0.1 + error_m,
+        target_m: Some(0.1 + error_m),
         posture: Posture::ElbowDown,
         mu: 0.2 + 0.05 * number,
         v_belt_m_s: 0.125 * number - 0.5,
@@ -55,9 +58,7 @@ pub(crate) fn rows(endings: &[(Ending, f64)]) -> Vec<Row> {
 #[test]
 fn every_ending_is_counted_and_the_most_severe_come_first() {
     let found = RobustnessOutcome::new(
-        Arms::Paper,
-        7,
-        Criterion::InPlace,
+        &campaign(1),
         rows(&[
             (Ending::Reached, 1e-4),
             (Ending::LiftOff, 0.02),
@@ -72,4 +73,34 @@ fn every_ending_is_counted_and_the_most_severe_come_first() {
         ]),
     );
     insta::assert_snapshot!(plain(&found));
+}
+
+#[test]
+fn the_command_that_repeats_a_run_has_the_changes_of_the_study() {
+    let study = Robustness {
+        arms: Arms::General,
+        overrides: vec!["controller.reference=[]".into(), "name=it's".into()],
+        ..campaign(1)
+    };
+    let rows = rows(&[(Ending::Fault, 0.1)]);
+    let table = plain(&Options::outcome(&study, rows));
+    let command = "painleve run --replay 1:INDEX --arms general --set 'controller.reference=[]' --set 'name=it'\\''s'";
+    assert!(table.contains(command), "{table}");
+}
+
+#[test]
+fn no_runs_slide_for_no_time() {
+    let found = plain(&Options::outcome(&campaign(1), Vec::new()));
+    assert!(found.contains("0 in 0.00 h"), "{found}");
+}
+
+#[test]
+fn a_run_without_a_target_has_an_empty_cell() {
+    let study = Robustness {
+        overrides: vec!["controller.reference=[]".into()],
+        ..campaign(1)
+    };
+    let found = Table::records(&study, 0).unwrap();
+    let place = found.header.iter().position(|name| name == b"target_m");
+    assert_eq!(&found.lines[0][place.unwrap()], b"");
 }

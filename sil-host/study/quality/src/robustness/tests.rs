@@ -16,7 +16,7 @@ use crate::ablation::{Ablation, AblationStudy, Condition};
 /// success on new seeds, as the campaigns in the documentation do.
 const REGRESSION_SEED: u64 = 987_654_321;
 
-fn campaign(runs: usize) -> Robustness {
+pub(super) fn campaign(runs: usize) -> Robustness {
     Robustness {
         arms: Arms::Paper,
         seed: 1,
@@ -35,7 +35,7 @@ fn rows_do_not_depend_on_threads() {
     };
     let found = on(1);
     assert_eq!(found, on(3));
-    let outcome = RobustnessOutcome::new(Arms::Paper, 1, Criterion::InPlace, found);
+    let outcome = RobustnessOutcome::new(&campaign(12), found);
     assert_eq!(outcome.endings.values().sum::<usize>(), 12);
     let failed = 12 - outcome.success.successes;
     assert_eq!(outcome.worst.len(), failed);
@@ -49,12 +49,7 @@ fn the_runs_of_the_regression_seed_succeed() {
         seed: REGRESSION_SEED,
         ..campaign(100)
     };
-    let outcome = RobustnessOutcome::new(
-        Arms::Paper,
-        study.seed,
-        study.criterion,
-        rows(&study, || ()).unwrap(),
-    );
+    let outcome = RobustnessOutcome::new(&study, rows(&study, || ()).unwrap());
     assert!(outcome.success.successes >= 98, "{}", outcome.table());
 }
 
@@ -134,12 +129,7 @@ fn general_arms_succeed_too() {
         seed: 77_003,
         ..campaign(50)
     };
-    let outcome = RobustnessOutcome::new(
-        Arms::General,
-        study.seed,
-        study.criterion,
-        rows(&study, || ()).unwrap(),
-    );
+    let outcome = RobustnessOutcome::new(&study, rows(&study, || ()).unwrap());
     assert!(outcome.success.successes >= 49, "{}", outcome.table());
 }
 
