@@ -47,7 +47,7 @@ impl Figure for EffectsOutcome {
 
 /// All effects of one controller on one contact.
 fn panel(all: &[Series], is_first: bool) -> Panel {
-    let shown: Vec<&Series> = all.iter().filter(|series| series.key != "–").collect();
+    let shown: Vec<&Series> = all.iter().filter(|series| !series.is_without()).collect();
     let count = shown.len().max(1);
     let line = |index: usize| (count - index) as f64 - 0.75;
     let place = |series: &Series, level: f64| {
@@ -105,7 +105,7 @@ fn panel(all: &[Series], is_first: bool) -> Panel {
             points: points.collect(),
         });
     }
-    let without = all.iter().find(|series| series.key == "–");
+    let without = all.iter().find(|series| series.is_without());
     let without = without.and_then(|series| series.cells.first());
     let none = without.map_or(String::new(), |cell| {
         format!("without any effect: {:.1} %", 100.0 * cell.success.rate)

@@ -45,7 +45,7 @@ pub struct Series {
     pub falls_below: [Fall; 3],
 }
 
-/// Where success falls below a rate.
+/// Where the observed success falls below a rate.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Fall {
@@ -106,7 +106,7 @@ impl EffectsOutcome {
         }
         let mut none = None;
         for series in &mut effects {
-            if series.effect == EFFECTS[0].name {
+            if series.is_without() {
                 none = series.cells.first().map(|cell| cell.success.rate);
             }
             series.falls_below = RATES.map(|rate| series.falls_below(rate, none));
@@ -154,6 +154,11 @@ impl Series {
         Fall::Beyond
     }
 
+    /// Whether these are the runs without any effect.
+    pub(super) fn is_without(&self) -> bool {
+        self.effect == EFFECTS[0].name
+    }
+
     /// Returns the effect.
     pub(super) fn effect(&self) -> &'static RigEffect {
         find(self.effect).unwrap_or(EFFECTS[0])
@@ -163,7 +168,7 @@ impl Series {
 impl core::fmt::Display for Fall {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         match self {
-            Self::Before => f.pad("–"),
+            Self::Before => f.pad("from the start"),
             Self::At(level) => f.pad(&number(*level)),
             Self::Beyond => f.pad("not reached"),
         }
@@ -192,7 +197,7 @@ impl Outcome for EffectsOutcome {
             &format!("level: {} (95 %), %", self.criterion.words()),
             "error, mm: median (95 %)",
             "before the edge, mm",
-            "below 99 %",
+            "observed rate below 99 %",
             "90 %",
             "50 %",
         ]);
