@@ -1,9 +1,6 @@
 //! The difference of two success rates in the same runs, and its confidence interval.
 
-use core::fmt;
-
-/// 97.5 % quantile of the standard normal distribution.
-const Z: f64 = 1.959_963_984_540_054;
+use crate::proportion::Z;
 
 /// Difference of two success rates in pairs of runs, with the 95 % interval of Agresti and Min (2005):
 /// that of Wald with half a run added to each of the four outcomes of a pair.
@@ -39,14 +36,6 @@ impl PairedDifference {
             lower: (middle - half).max(-1.0),
             upper: (middle + half).min(1.0),
         }
-    }
-}
-
-impl fmt::Display for PairedDifference {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let [difference, lower, upper] =
-            [self.difference, self.lower, self.upper].map(|rate| 100.0 * rate);
-        write!(f, "{difference:+.2} % ({lower:+.2} … {upper:+.2} %)")
     }
 }
 

@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 /// 97.5 % quantile of the standard normal distribution.
-const Z: f64 = 1.959_963_984_540_054;
+pub(crate) const Z: f64 = 1.959_963_984_540_054;
 
 /// Number of successes in a number of runs, with Wilson's 95 % interval, which also holds near 0 and 1.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]

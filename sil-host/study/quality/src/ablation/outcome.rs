@@ -38,8 +38,6 @@ pub struct Ablated {
     pub not_captured: usize,
     /// Runs with a fault, or whose plant could not be solved.
     pub faults: usize,
-    /// Mean distance from the governed reference at the end, mm.
-    pub mean_error_mm: f64,
     /// What the table shows: the share of the whole controller or the change without the part, in percent. A change that
     /// may be chance is in parentheses.
     pub shown: String,
@@ -93,7 +91,6 @@ impl Ablated {
             lower,
             upper,
         } = Proportion::new(count(Ending::is_kept), rows.len());
-        let errors_m: f64 = rows.iter().map(|row| row.error_m).sum();
         let (lost, gained) = (differing(true), differing(false));
         let shown = match without {
             None => format!("{:.1} %", 100.0 * rate),
@@ -113,7 +110,6 @@ impl Ablated {
             lift_offs: count(|ending| ending == Ending::LiftOff),
             not_captured: count(|ending| ending == Ending::NotCaptured),
             faults: count(|ending| matches!(ending, Ending::Fault | Ending::Unsolved)),
-            mean_error_mm: 1e3 * errors_m / rows.len() as f64,
             shown,
         }
     }

@@ -72,7 +72,7 @@ impl LiftOffs {
                 noticed_s: Percentiles::of(noticed),
                 flight_s: Percentiles::of(solved().filter_map(|row| row.flight_s).collect()),
                 false_alarms: of.iter().map(|row| row.false_alarms).sum(),
-                slid_h: of.iter().map(|row| row.slid_s).sum::<f64>() / 3600.0,
+                slid_h: of.iter().map(|row| row.slid_s).sum::<f64>() / 3600.0 + 0.0,
             }
         });
         Self {

@@ -113,3 +113,9 @@ fn the_table_distinguishes_early_late_short_and_missed() {
     ];
     insta::assert_snapshot!(plain(&LiftOffs::new(rows)));
 }
+
+#[test]
+fn no_runs_slide_for_no_time() {
+    let found = plain(&LiftOffs::new(Vec::new()));
+    assert!(!found.contains("-0.00"), "{found}");
+}

@@ -69,9 +69,9 @@ impl Outcome for LoopOutcome {
                     number(margins.phase_deg, 1),
                     number(margins.delay_ms, 2),
                     format!(
-                        "+{} −{}",
-                        number(margins.gain_db, 1),
-                        number(margins.reduction_db, 1)
+                        "{}, {}",
+                        margin('+', margins.gain_db),
+                        margin('−', margins.reduction_db)
                     ),
                     number(Some(margins.modulus), 3),
                     pair(sensitivity.less_friction, sensitivity.more_friction),
@@ -86,6 +86,10 @@ impl Outcome for LoopOutcome {
 
 fn number(value: Option<f64>, digits: usize) -> String {
     value.map_or("–".into(), |value| format!("{value:.digits$}"))
+}
+
+fn margin(sign: char, decibels: Option<f64>) -> String {
+    decibels.map_or("none".into(), |value| format!("{sign}{value:.1}"))
 }
 
 fn pair(less: Option<f64>, more: Option<f64>) -> String {
