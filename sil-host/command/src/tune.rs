@@ -16,6 +16,7 @@ use serde_json::json;
 
 use super::json::JsonOption;
 use super::output_error::{InputError, output};
+use super::study::outcome::Threads;
 use super::{CommandError, distinct_files};
 
 /// Options of `painleve tune`.
@@ -48,6 +49,8 @@ pub struct TuneArguments {
     #[arg(long, value_name = "PATH", default_value = "out/tune.svg", value_parser = super::figure_path())]
     plot: PathBuf,
     #[command(flatten)]
+    threads: Threads,
+    #[command(flatten)]
     json: JsonOption,
 }
 
@@ -57,6 +60,10 @@ pub struct TuneArguments {
 /// [`CommandError`] if the scenario or a key is invalid, the table belongs to another search, or an output cannot be
 /// written.
 pub fn run(arguments: &TuneArguments) -> Result<(), CommandError> {
+    arguments.threads.in_pool(|| search(arguments))?
+}
+
+fn search(arguments: &TuneArguments) -> Result<(), CommandError> {
     check_keys(&arguments.keys)?;
     let interrupt = Interrupt::catch()?;
     let tuning = Tuning {
