@@ -38,13 +38,42 @@ impl GearSettings {
     #[inline]
     pub fn torque_nm(&self, twist_rad: f64, twist_rate_rad_s: f64) -> f64 {
         let half = 0.5 * self.backlash_deg.to_radians();
-        let strain = if twist_rad > half {
-            twist_rad - half
-        } else if twist_rad < -half {
-            twist_rad + half
+        let strain = twist_rad - twist_rad.clamp(-half, half);
+        let torque = self.stiffness_nm_rad * strain + self.damping_nms_rad * twist_rate_rad_s;
+        // With backlash each flank only pushes.
+        if half == 0.0 {
+            torque
+        } else if strain > 0.0 {
+            torque.max(0.0)
+        } else if strain < 0.0 {
+            torque.min(0.0)
         } else {
-            return 0.0;
+            0.0
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_flank_pushes_only_and_a_gear_without_backlash_also_damps_without_twist() {
+        let gear = |backlash_deg| GearSettings {
+            backlash_deg,
+            ..Default::default()
         };
-        self.stiffness_nm_rad * strain + self.damping_nms_rad * twist_rate_rad_s
+        let loose = gear(1.0);
+        let flank_rad = 0.5_f64.to_radians();
+        for side in [1.0, -1.0] {
+            let torque_nm = |inside_rad, rate| {
+                side * loose.torque_nm(side * (flank_rad + inside_rad), side * rate)
+            };
+            assert_eq!(torque_nm(1e-6, -1.0), 0.0);
+            assert_eq!(torque_nm(-1e-6, 1.0), 0.0);
+            assert!((torque_nm(1e-3, -1.0) - 0.45).abs() < 1e-12);
+        }
+        assert_eq!(gear(0.0).torque_nm(0.0, 1.0), 0.05);
+        assert!(gear(0.0).torque_nm(1e-6, -1.0) < 0.0);
     }
 }
