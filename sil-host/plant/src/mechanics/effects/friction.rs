@@ -99,21 +99,32 @@ impl FrictionChange {
 
 /// Returns +1 or −1 for a patch, from the bits of its number.
 fn sign(seed: u64, patch: f64) -> f64 {
-    let mut bits = seed ^ (patch as i64).cast_unsigned();
-    // The mixing steps of SplitMix64.
-    bits = bits.wrapping_add(0x9e37_79b9_7f4a_7c15);
-    bits = (bits ^ (bits >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    bits = (bits ^ (bits >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    if (bits ^ (bits >> 31)) & 1 == 0 {
-        1.0
-    } else {
-        -1.0
-    }
+    // The seed alone is mixed first: otherwise small seeds would only permute the same patches.
+    let bits = mixed(mixed(seed) ^ (patch as i64).cast_unsigned());
+    if bits & 1 == 0 { 1.0 } else { -1.0 }
+}
+
+/// Mixes bits by the steps of SplitMix64.
+fn mixed(bits: u64) -> u64 {
+    let bits = bits.wrapping_add(0x9e37_79b9_7f4a_7c15);
+    let bits = (bits ^ (bits >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    let bits = (bits ^ (bits >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    bits ^ (bits >> 31)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn another_seed_does_not_permute_the_same_patches() {
+        let raised = |seed| {
+            (0..64)
+                .filter(|patch| sign(seed, f64::from(*patch)) > 0.0)
+                .count()
+        };
+        assert!((1..16).any(|seed| raised(seed) != raised(0)));
+    }
 
     #[test]
     fn patches_are_balanced_and_repeatable() {
