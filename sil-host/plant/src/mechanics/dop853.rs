@@ -2,11 +2,8 @@
 //! (Hairer, Nørsett, Wanner, *Solving Ordinary Differential Equations I*,
 //! section II.10; coefficients of their `dop853.f`).
 //!
-//! One step is one function call on stack memory: no allocation, no dispatch. The libraries
-//! compared beforehand (see `docs/plant.md`) were `differential-equations` 0.7 (its event location
-//! gave wrong roots), `diffsol` 0.18 (right roots, but heap vectors in every step) and
-//! `ode_solvers` 0.6 (no roots). The plant needs a step, an error estimate and a polynomial; it
-//! locates contact events itself, so the rest of a solver library would be unused.
+//! One step is one function call on stack memory: no allocation, no dispatch. The plant needs a step, an error estimate
+//! and a polynomial; it locates contact events itself, so the rest of a solver library would be unused.
 
 use nalgebra::SVector;
 
