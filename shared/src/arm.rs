@@ -41,8 +41,8 @@ settings! {
         coulomb_friction_nm: [T; 2] = [T::zero(); 2], 0.0..=10.0, "N·m";
         /// Inertia of each joint's rotor, reflected to the joint.
         rotor_inertia_kg_m2: [T; 2] = [T::zero(); 2], 0.0..=1e4, "kg·m²";
-        /// Distance H of the first joint from the belt; less than the arm's length, and more than
-        /// the difference of the links' lengths.
+        /// Distance H of the first joint from the belt: 0.01 to 0.999 of l1 + l2, and at least 1.001 of the
+        /// difference of l1 and l2.
         height_m: T = T::literal(0.3775), 1e-4..=20.0, "m";
         /// Angle by which the belt rises in its direction t.
         belt_tilt_rad: T = T::zero(), -PI..=PI, "rad";
@@ -127,8 +127,8 @@ impl<T: Real> Arm<T> {
     ///
     /// # Errors
     /// [`OutOfRange`], with a key in the group `arm`, for the first parameter that is not finite, not physical,
-    /// or that puts the belt out of reach (H ≥ l1 + l2 or H ≤ |l1 − l2|); also if the mass matrix of the links
-    /// is singular, that is, if some motion of the links has no kinetic energy.
+    /// or that puts the belt out of reach; also if the mass matrix of the links is nearly singular, that is, if some
+    /// motion of the links has hardly any kinetic energy.
     pub fn new(parameters: ArmParameters<T>) -> Result<Self, OutOfRange> {
         parameters.validate().map_err(|error| error.inside("arm"))?;
         let [length_1, length_2] = parameters.link_length_m;
@@ -186,7 +186,7 @@ impl<T: Real> Arm<T> {
         let coupling = arm.inertia_coupling.abs() + rotor_2;
         let determinant = (product - coupling * coupling) / product;
         range::check(
-            "least det M / (M11 M22)",
+            "link_inertia_kg_m2, link_centre_of_mass_m or rotor_inertia_kg_m2: det M / (M11 M22)",
             determinant,
             LEAST_DETERMINANT,
             1.0,
@@ -319,7 +319,8 @@ mod tests {
             ..Default::default()
         };
         let error = refused(parameters);
-        assert_eq!(error.key, "arm.least det M / (M11 M22)");
+        let key = "arm.link_inertia_kg_m2, link_centre_of_mass_m or rotor_inertia_kg_m2: det M / (M11 M22)";
+        assert_eq!(error.key, key);
         // A mass at the tip gives both links inertia; a mass on the line through joint 1 alone does not.
         let ideal = ArmParameters {
             tip_mass_kg: 0.1,
