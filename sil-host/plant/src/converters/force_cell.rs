@@ -33,7 +33,7 @@ settings! {
         gain_error: [f64; 2] = [0.0; 2], -1.0..=10.0;
         /// Share of f_n that the reading of f_t contains, and share of f_t that the reading of f_n contains.
         cross_talk: [f64; 2] = [0.0; 2], -1.0..=1.0;
-        /// Time constant of a low-pass on the samples; 0 for none.
+        /// Time constant of a low-pass on the force, before its zero and noise; 0 for none.
         low_pass_s: f64 = 0.0, 0.0..=10.0, "s";
         /// Whole control ticks from a sample to the frame that carries it.
         delay_ticks: u8 = 0, 0..=MAXIMUM_DELAY_TICKS as u8, "ticks";

@@ -14,7 +14,7 @@ settings! {
     pub struct TorqueErrorSettings {
         /// Relative error g of the gain of each joint.
         gain: [f64; 2] = [0.0; 2], -1.0..=10.0;
-        /// Largest torque that each stage gives, which the controller does not know; that of its range if absent.
+        /// Largest torque that each stage gives, which the controller does not know; no limit if absent.
         limit_nm: Option<[f64; 2]> = None, 0.0..=1e6, "N·m";
         /// Dead zone: reduces the magnitude of a commanded torque by this amount, to zero for
         /// smaller torques.
