@@ -25,9 +25,9 @@ settings! {
     /// Restitution of impacts. Poisson with e = 0.10 reproduces the paper's bouncing window.
     #[derive(Copy)]
     pub struct ImpactLaw {
-        /// Definition of the coefficient of restitution.
+        /// Definition of the coefficient of restitution. Rigid contact only.
         law: Restitution = Restitution::Poisson;
-        /// Coefficient of restitution e.
+        /// Coefficient of restitution e. Rigid contact only.
         restitution: f64 = 0.10, 0.0..=1.0;
     }
 }

@@ -16,7 +16,7 @@ pub enum MotionError {
     },
     /// The integrator needs so many steps that the run would take hours.
     #[error(
-        "the plant is too stiff: far more than 500,000 integration steps a second by t = {time_s} s; give its arm less damping or stiffness for its masses"
+        "the plant is too stiff: far more than 500,000 integration steps a second by t = {time_s} s; give its arm less damping or stiffness for its masses, its contact less stiffness or damping, or its integration a larger tolerance (`contact.local_error`, `solver.relative_tolerance`)"
     )]
     TooStiff {
         /// Time, s.

@@ -59,16 +59,16 @@ settings! {
     /// Accuracy of the solution, and conventions for ambiguities of the model.
     #[derive(Copy)]
     pub struct SolverSettings {
-        /// Error of one step relative to the state.
+        /// Error of one step relative to the state. Rigid contact only.
         relative_tolerance: f64 = 1e-9, 1e-13..=1e-3;
-        /// Error of one step, rad and rad/s.
+        /// Error of one step, rad and rad/s. Rigid contact only.
         absolute_tolerance: f64 = 1e-10, 1e-14..=1e-3;
-        /// Largest step.
+        /// Largest step. Rigid contact only.
         maximum_step_s: f64 = 0.05, 1e-5..=1.0, "s";
-        /// A rebound slower than this ends a series of bounces. With the default, the last bounces are lower than the
-        /// rounding error of the gap.
+        // With the default, the last bounces are lower than the rounding error of the gap.
+        /// A rebound slower than this ends a series of bounces. Rigid contact only.
         chatter_speed_m_s: f64 = 1e-6, 1e-7..=1e-2, "m/s";
-        /// What follows if both sliding and flight are solutions.
+        /// What follows if both sliding and flight are solutions. Rigid contact only.
         indeterminate: Indeterminate = Indeterminate::Flight;
     }
 }

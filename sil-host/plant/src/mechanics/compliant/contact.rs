@@ -47,12 +47,11 @@ settings! {
 }
 
 settings! {
-    /// The contact between tip and belt. All keys but `kind` apply to the compliant contact. The
-    /// default is 10⁵ N/m with a damping ratio of 0.6 for 40 g, which gives a restitution near the
-    /// paper's.
+    /// The contact between tip and belt. The default is 10⁵ N/m with a damping ratio of 0.6 for 40 g, which gives a
+    /// restitution near the paper's.
     #[derive(Copy)]
     pub struct TipContact {
-        /// Rigid or compliant.
+        /// Rigid or compliant; the other keys are for a compliant one.
         kind: ContactKind = ContactKind::Rigid;
         /// Normal stiffness k.
         stiffness_n_m: f64 = 1e5, 1e3..=1e9, "N/m";
@@ -70,7 +69,7 @@ settings! {
         viscous_friction_s_m: f64 = 0.0, 0.0..=10.0, "s/m";
         /// Error tolerance of one integration step, absolute and relative: for angles (rad), rates
         /// (rad/s) and the bristles' deflection y.
-        local_error: f64 = 1e-6, 1e-12..=1e-3;
+        local_error: f64 = 1e-6, 1e-9..=1e-3;
     }
 }
 
