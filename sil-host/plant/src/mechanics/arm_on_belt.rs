@@ -4,9 +4,8 @@ mod contact_change;
 mod short_step;
 
 use nalgebra::Vector2;
-use painleve_shared::range::{self, OutOfRange};
 use painleve_shared::settings::Settings;
-use painleve_shared::{Arm, JointTorque, LinkMotion, Slip};
+use painleve_shared::{Arm, JointTorque, LinkMotion, OutOfRange, Slip};
 
 use crate::plant::{ContactMode, Plant, PlantError, Probe, Snapshot, State};
 
@@ -94,15 +93,7 @@ impl ArmOnBelt {
             step: Box::new(Dop853Step::empty()),
         };
         let motion = plant.motion();
-        let gap_m = motion.gap_m(&initial);
-        range::check(
-            "initial tip height over the belt in m",
-            gap_m,
-            -INSIDE_AT_START_M,
-            plant.arm.height_m() + plant.arm.reach_m(),
-        )?;
-        if gap_m < CONTACT_AT_START_M {
-            let on_belt = motion.lowered_onto_belt(&initial);
+        if let Some(on_belt) = motion.start_on_belt(&initial, |_| (0.0, 0.0))? {
             let velocity = motion.relative_velocity_m_s(0.0, &on_belt);
             if velocity.y.abs() <= plant.solver.chatter_speed_m_s {
                 plant.state = motion.onto_belt(&on_belt);
@@ -288,7 +279,7 @@ impl ArmOnBelt {
         };
         let (mode, start_s, start) = (self.mode, self.time_s, self.state);
         let remaining = until_s - start_s;
-        if remaining <= self.short_size_s {
+        if remaining <= self.short_size_s.min(self.solver.maximum_step_s) {
             let (step, longest) = self.short_step(&motion, &here, until_s, &tolerance);
             self.short_size_s = longest;
             if let Some((end, terms, there)) = step {
@@ -446,10 +437,3 @@ impl Plant for ArmOnBelt {
         Self::contact_force_n(self)
     }
 }
-
-/// Height below which a tip counts as touching the belt at the start, m: the paper gives its
-/// initial conditions to three digits.
-pub(super) const CONTACT_AT_START_M: f64 = 1e-4;
-
-/// Deepest start inside the belt that is treated as a rounding error, m.
-pub(super) const INSIDE_AT_START_M: f64 = 1e-3;

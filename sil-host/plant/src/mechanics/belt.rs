@@ -171,12 +171,18 @@ impl BeltProfile {
         }
     }
 
-    /// Returns the next time after `t_s` at which speed or acceleration jumps,
-    /// s; infinite if there is none.
+    /// Returns the next time after `t_s` at which speed or acceleration jumps or turns back, s; infinite if there is
+    /// none. Between two of them both are monotone, so that the ends of a step show what happens within it.
     #[inline]
     pub fn next_corner_s(&self, t_s: f64) -> f64 {
         let corners = match *self {
-            Self::Constant { .. } | Self::Sine { .. } => [f64::INFINITY; 2],
+            Self::Constant { .. } => [f64::INFINITY; 2],
+            Self::Sine { frequency_hz, .. } => {
+                let quarter_s = 0.25 / frequency_hz;
+                // Rounding may put the first one at `t_s`.
+                let next = libm::floor(t_s / quarter_s) + 1.0;
+                [next * quarter_s, (next + 1.0) * quarter_s]
+            }
             Self::File { ref path } => [path.next_corner_s(t_s), f64::INFINITY],
             Self::Step { at_s, .. } => [at_s, f64::INFINITY],
             Self::Ramp {

@@ -1,6 +1,7 @@
 //! Equations of motion and contact force in each contact mode.
 
 use nalgebra::{Matrix2, Vector2};
+use painleve_shared::range::{self, OutOfRange};
 use painleve_shared::{Arm, ContactTerms, GeneralisedTorque, JointTorque, LinkMotion, Pose, Slip};
 
 use crate::plant::{ContactMode, Snapshot, State};
@@ -20,6 +21,20 @@ pub fn theta(state: &State) -> LinkMotion<f64> {
 pub fn theta_dot(state: &State) -> LinkMotion<f64> {
     LinkMotion::new(state[2], state[3])
 }
+
+/// Height below which a tip counts as touching the belt at the start, m: the paper gives its
+/// initial conditions to three digits.
+const CONTACT_AT_START_M: f64 = 1e-4;
+
+/// Deepest start inside the belt that is treated as a rounding error, m.
+const INSIDE_AT_START_M: f64 = 1e-3;
+
+/// Distance from the belt that is a rounding error, m.
+const ON_BELT_M: f64 = 1e-12;
+
+/// Largest turn of the links that moves a start onto the belt. The short links of a small arm, or an uneven belt, take
+/// several degrees; an arm that points straight at the belt takes any turn.
+const LARGEST_TURN_AT_START_DEG: f64 = 30.0;
 
 /// Changes of the angles whose squares are below rounding, rad.
 const FIRST_ORDER_RAD: f64 = 1e-9;
@@ -337,18 +352,61 @@ impl Motion<'_> {
         [along, normal, direction, change]
     }
 
+    /// Returns the start with its tip on the belt, if the tip is at most 0.1 mm above it; `None` for a higher tip.
+    /// The belt's `surface` has a height above the flat belt (m) and a slope at each z_t (m).
+    ///
+    /// # Errors
+    /// [`OutOfRange`] if the tip is more than 1 mm inside the flat belt, or if the arm has to turn far.
+    pub fn start_on_belt(
+        &self,
+        start: &State,
+        surface: impl Fn(f64) -> (f64, f64),
+    ) -> Result<Option<State>, OutOfRange> {
+        let gap_m = self.gap_m(start);
+        range::check(
+            "initial tip height over the belt in m",
+            gap_m,
+            -INSIDE_AT_START_M,
+            self.arm.height_m() + self.arm.reach_m(),
+        )?;
+        let gap_over = |state: &State| self.gap_m(state) - surface(self.tip_t_m(state)).0;
+        if gap_m.min(gap_over(start)) >= CONTACT_AT_START_M {
+            return Ok(None);
+        }
+        let on_belt = self.lowered_onto(start, &surface);
+        let turn_deg = if gap_over(&on_belt).abs() < ON_BELT_M {
+            (on_belt - start).norm().to_degrees()
+        } else {
+            f64::INFINITY
+        };
+        range::check(
+            "turn of initial.theta1_deg and initial.theta2_deg onto the belt in degrees",
+            turn_deg,
+            0.0,
+            LARGEST_TURN_AT_START_DEG,
+        )?;
+        Ok(Some(on_belt))
+    }
+
     /// Returns the nearest state with the tip at belt height and unchanged velocities.
     pub fn lowered_onto_belt(&self, state: &State) -> State {
+        self.lowered_onto(state, |_| (0.0, 0.0))
+    }
+
+    #[inline]
+    fn lowered_onto(&self, state: &State, surface: impl Fn(f64) -> (f64, f64)) -> State {
         let mut state = *state;
         // Newton's method: two iterations remove any integration error to rounding; the others are
         // for initial conditions set by the user.
         for _ in 0..8 {
             let pose = Pose::new(&theta(&state));
-            let gap = self.arm.gap_m(&pose);
+            let (height, slope) = surface(self.arm.tip_m(&pose).x);
+            let gap = self.arm.gap_m(&pose) - height;
             if gap.abs() < 1e-16 {
                 break;
             }
-            let normal = self.arm.jacobian(&pose).row(1).transpose();
+            let jacobian = self.arm.jacobian(&pose);
+            let normal = (jacobian.row(1) - jacobian.row(0) * slope).transpose();
             let direction = self.arm.inverse_mass_matrix(&pose) * normal;
             let change = direction * (-gap / normal.dot(&direction));
             state += State::new(change.x, change.y, 0.0, 0.0);

@@ -68,7 +68,8 @@ impl MovingBelt {
         self.offset_m + self.profile.displacement_m(0.0, t_s)
     }
 
-    /// Returns the next time after `t_s` at which speed or acceleration jumps, s; infinite if there is none.
+    /// Returns the next time after `t_s` at which speed or acceleration jumps or turns back, s; infinite if there
+    /// is none.
     #[inline]
     pub fn next_corner_s(&self, t_s: f64) -> f64 {
         let jump_s = self.jump.as_ref().map_or(f64::INFINITY, |(at_s, _)| *at_s);

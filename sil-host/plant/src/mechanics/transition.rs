@@ -34,8 +34,8 @@ const REST_SLIP_M_S: f64 = 1e-12;
 /// Below this fraction of Q22, p counts as zero: −b/p then exceeds any force.
 const P_GUARD: f64 = 1e-6;
 
-/// Clearance, m, below which a step is searched for contact; it exceeds the error of the quintic of
-/// [`stays_above`] within one step.
+/// Clearance, m, below which a step is searched for contact; at the default tolerances it
+/// exceeds the error of the quintic of [`stays_above`] within one step.
 const CLEARANCE_M: f64 = 1e-6;
 
 /// A tip that leaves the belt faster than this is thrown off, m/s.
@@ -61,42 +61,44 @@ pub fn decide(
     let terms = motion.terms(t_s, state);
     let slip_speed = motion.relative_velocity_m_s(t_s, state).x;
     if slip_speed.abs() <= REST_SLIP_M_S {
-        return from_rest(motion, t_s, &terms);
+        return Continuation::Mode(from_rest(motion, t_s, &terms));
     }
     let slip = Slip::of(slip_speed);
-    let p = guarded_p(motion, &terms, slip);
-    Continuation::Mode(match SolutionMode::classify(p, terms.b()) {
+    let guarded = |side| guarded_p(side, terms.p(motion.friction, slip), terms.q.m22);
+    Continuation::Mode(match SolutionMode::classify(guarded(1.0), terms.b()) {
         SolutionMode::Sliding => ContactMode::slide(slip),
         SolutionMode::Flight => ContactMode::Flight,
         SolutionMode::Indeterminate => match indeterminate {
-            Indeterminate::Flight => ContactMode::Flight,
-            Indeterminate::Slide => ContactMode::slide(slip),
+            Indeterminate::Slide if guarded(-1.0) > 0.0 => ContactMode::slide(slip),
+            _ => ContactMode::Flight,
         },
         SolutionMode::Inconsistent => return Continuation::Thrown,
     })
 }
 
-fn guarded_p(motion: &Motion<'_>, terms: &ContactTerms<f64>, slip: Slip) -> f64 {
-    terms.p(motion.friction, slip) - P_GUARD * terms.q.m22
+/// Returns how far p is from zero on its side, in excess of the guard, 1/kg. The side is 1 in a determinate slide; −1 in
+/// an indeterminate one, in which p and b both have the opposite sign.
+#[inline]
+fn guarded_p(side: f64, p_per_kg: f64, q22_per_kg: f64) -> f64 {
+    side * p_per_kg - P_GUARD * q22_per_kg
 }
 
-fn from_rest(motion: &Motion<'_>, t_s: f64, terms: &ContactTerms<f64>) -> Continuation {
+fn from_rest(motion: &Motion<'_>, t_s: f64, terms: &ContactTerms<f64>) -> ContactMode {
     if terms.b() >= 0.0 {
-        return Continuation::Mode(ContactMode::Flight);
+        return ContactMode::Flight;
     }
     if cone_margin(motion, t_s, terms) >= 0.0 {
-        return Continuation::Mode(ContactMode::Stick);
+        return ContactMode::Stick;
     }
     // At the edge of the cone, one direction has zero acceleration up to rounding and the other an
     // acceleration against itself: take the better of the two.
     let away = |slip: Slip| slip.sign::<f64>() * slip_acceleration(motion, t_s, terms, slip);
     [Slip::Positive, Slip::Negative]
         .into_iter()
-        .filter(|slip| guarded_p(motion, terms, *slip) > 0.0)
+        .filter(|slip| guarded_p(1.0, terms.p(motion.friction, *slip), terms.q.m22) > 0.0)
         .max_by(|one, other| away(*one).total_cmp(&away(*other)))
-        .map_or(Continuation::Thrown, |slip| {
-            Continuation::Mode(ContactMode::slide(slip))
-        })
+        // In one direction p is at least Q22, so there is a slip.
+        .map_or(ContactMode::Flight, ContactMode::slide)
 }
 
 /// Returns the distance of the sticking force from the edge of the friction cone, N; negative
@@ -122,18 +124,29 @@ pub fn event_functions(
     t_s: f64,
     state: &State,
 ) -> [f64; 3] {
-    let Some(slip) = mode.slip() else {
-        if mode == ContactMode::Flight {
-            return [motion.gap_m(state), f64::INFINITY, f64::INFINITY];
-        }
-        let terms = motion.terms(t_s, state);
-        return [cone_margin(motion, t_s, &terms), -terms.b(), f64::INFINITY];
-    };
+    if let Some(slip) = mode.slip() {
+        return slide_functions(motion, slip, 1.0, t_s, state);
+    }
+    if mode == ContactMode::Flight {
+        return [motion.gap_m(state), f64::INFINITY, f64::INFINITY];
+    }
+    let terms = motion.terms(t_s, state);
+    [cone_margin(motion, t_s, &terms), -terms.b(), f64::INFINITY]
+}
+
+/// Returns the [`event_functions`] of a slide on either [side](guarded_p) of p = 0.
+fn slide_functions(
+    motion: &Motion<'_>,
+    slip: Slip,
+    side: f64,
+    t_s: f64,
+    state: &State,
+) -> [f64; 3] {
     let terms = motion.terms(t_s, state);
     [
         slip.sign::<f64>() * motion.relative_velocity_m_s(t_s, state).x,
-        -terms.b(),
-        guarded_p(motion, &terms, slip),
+        side * -terms.b(),
+        guarded_p(side, terms.p(motion.friction, slip), terms.q.m22),
     ]
 }
 
@@ -164,9 +177,8 @@ pub fn goes_on(
         let inside_cone = motion.friction * end.force_n.y - end.force_n.x.abs() >= 0.0;
         return inside_cone && end.b_m_s2 <= 0.0 && h <= SHORT_STEP_S;
     };
-    let guarded_p = |at: &Evaluation| at.p_per_kg - P_GUARD * at.q22_per_kg;
-    let side = side_of(guarded_p(start));
-    let holds = side * -end.b_m_s2 >= 0.0 && side * guarded_p(end) >= 0.0;
+    let side = start.p_per_kg.signum();
+    let holds = side * -end.b_m_s2 >= 0.0 && guarded_p(side, end.p_per_kg, end.q22_per_kg) >= 0.0;
     // Slip can vanish and restart within a step; a cubic through both ends detects this.
     let sign = slip.sign::<f64>();
     let [v0, a0] = start.slip.map(|x| sign * x);
@@ -174,12 +186,6 @@ pub fn goes_on(
     let third = h / 3.0;
     let slides = v0.min(v1).min(v0 + a0 * third).min(v1 - a1 * third) >= 0.0;
     holds && slides && h <= SHORT_STEP_S
-}
-
-/// Returns 1 in a determinate slide; −1 in an indeterminate one, in which p and b both have the
-/// opposite sign.
-fn side_of(guarded_p: f64) -> f64 {
-    if guarded_p > 0.0 { 1.0 } else { -1.0 }
 }
 
 /// Returns the time of the first event in a finished step, s; the event has happened at that time.
@@ -195,9 +201,8 @@ pub fn first_event_s(
     }
     match mode {
         ContactMode::Flight => first_landing_s(motion, step, start),
-        ContactMode::SlidePositive | ContactMode::SlideNegative => {
-            first_end_of_slide_s(motion, mode, step, start)
-        }
+        ContactMode::SlidePositive => first_end_of_slide_s(motion, Slip::Positive, step, start),
+        ContactMode::SlideNegative => first_end_of_slide_s(motion, Slip::Negative, step, start),
         ContactMode::Stick => {
             let margin = |t: f64, x: &State| {
                 let [cone, pressed, _] = event_functions(motion, mode, t, x);
@@ -298,17 +303,16 @@ pub fn landing_correction_s(motion: &Motion<'_>, mode: ContactMode, state: &Stat
 
 fn first_end_of_slide_s(
     motion: &Motion<'_>,
-    mode: ContactMode,
+    slip: Slip,
     step: &mut Dop853Step<4>,
     start: &Evaluation,
 ) -> Option<f64> {
-    let side = side_of(start.p_per_kg - P_GUARD * start.q22_per_kg);
+    let side = start.p_per_kg.signum();
     let margin = |t: f64, x: &State| {
-        let [sliding, pressed, p] = event_functions(motion, mode, t, x);
-        (sliding + 0.5 * REST_SLIP_M_S)
-            .min(side * pressed)
-            .min(side * p)
+        let [sliding, pressed, p] = slide_functions(motion, slip, side, t, x);
+        (sliding + 0.5 * REST_SLIP_M_S).min(pressed).min(p)
     };
+    let mode = ContactMode::slide(slip);
     let dense = step.dense(&|t, x: &State| motion.derivative(mode, t, x));
     first_in_parts(step, &dense, &margin)
 }

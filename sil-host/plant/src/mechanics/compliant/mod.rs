@@ -13,15 +13,12 @@ mod step;
 
 use nalgebra::{Const, DimMin, SVector, ToTypenum, Vector2};
 use painleve_shared::settings::Settings;
-use painleve_shared::{
-    Arm, ArmParameters, JointMotion, JointTorque, LinkMotion, OutOfRange, Slip, range,
-};
+use painleve_shared::{Arm, ArmParameters, JointMotion, JointTorque, LinkMotion, OutOfRange, Slip};
 
 pub use contact::{CompliantContact, ContactKind, NormalDamping, TipContact};
 use equations::{CompliantMotion, FULL, PLAIN, WITH_DRIVES};
 use step::CompliantStep;
 
-use super::arm_on_belt::{CONTACT_AT_START_M, INSIDE_AT_START_M};
 use super::belt::BeltSettings;
 use super::effects::Effects;
 use super::effects::gear::EncoderSide;
@@ -32,7 +29,7 @@ use super::torque::TorqueSegment;
 use super::{InitialState, MotionError, PlantParameters};
 use crate::plant::{ContactMode, Event, Plant, PlantError, Probe, Snapshot, State};
 
-/// Longest step, s, so that no short touch falls between two checks of the gap.
+/// Longest step, s. A touch that is much shorter can fall between two evaluations of the gap.
 const MAXIMUM_STEP_S: f64 = 2e-3;
 /// Slip velocity below which a touching tip sticks, m/s.
 const STICK_M_S: f64 = 1e-3;
@@ -68,7 +65,7 @@ impl CompliantArmOnBelt {
     }
 
     /// Creates a plant at time zero with zero torque. A tip at most 0.1 mm above the belt or 1 mm
-    /// inside it is first moved onto the belt, without force.
+    /// inside it is first moved onto the belt's surface, without force of the contact's spring.
     ///
     /// # Errors
     /// [`OutOfRange`] naming the first parameter that is out of range.
@@ -111,21 +108,13 @@ impl CompliantArmOnBelt {
             budget: StepBudget::default(),
         };
         let motion = plant.motion().rigid(0.0, 0.0);
-        let gap_m = motion.gap_m(&initial);
-        range::check(
-            "initial tip height over the belt in m",
-            gap_m,
-            -INSIDE_AT_START_M,
-            plant.arm.height_m() + plant.arm.reach_m(),
-        )?;
-        let touches = gap_m < CONTACT_AT_START_M;
-        let start = if touches {
-            motion.lowered_onto_belt(&initial)
-        } else {
-            initial
-        };
-        let slip_m_s = motion.relative_velocity_m_s(0.0, &start).x;
-        if touches {
+        let on_belt = motion.start_on_belt(&initial, |tip_t_m| {
+            let (height_m, slope, _) = effects.surface.at(0.0, tip_t_m);
+            (height_m, slope)
+        })?;
+        let start = on_belt.unwrap_or(initial);
+        if on_belt.is_some() {
+            let slip_m_s = motion.relative_velocity_m_s(0.0, &start).x;
             plant.mode = ContactMode::slide(Slip::of(slip_m_s));
         }
         let rotors = [start[0], start[1] - start[0], start[2], start[3] - start[2]];

@@ -286,6 +286,26 @@ fn a_stiff_hanging_belt_is_a_belt_on_a_firm_bed_with_and_without_drives() {
 }
 
 #[test]
+fn a_start_on_an_uneven_belt_touches_its_surface_without_force() {
+    for (waviness_m, step_height_m) in [(0.0, 0.01), (0.0, -0.01), (1e-3, 0.0)] {
+        let surface = Surface {
+            waviness_m,
+            step_height_m,
+            ..Default::default()
+        };
+        let effects = Effects {
+            surface,
+            ..Default::default()
+        };
+        let plant = compliant(&contact(1e5, 1e-6), &effects, ON_BELT_DEG);
+        let start = plant.snapshot();
+        assert!(start.gap_m.abs() < 1e-12, "{}", start.gap_m);
+        assert!(start.normal_force_n < 1e-3, "{}", start.normal_force_n);
+        assert!(start.mode.is_contact());
+    }
+}
+
+#[test]
 fn a_belt_that_changes_its_speed_keeps_its_surface_where_it_is() {
     let effects = Effects {
         surface: Surface {
