@@ -319,7 +319,7 @@ fn joints_that_vibrate_do_not_pass_for_joints_with_less_friction() {
     assert!(rig.largest_force_n < 15.0, "{}", rig.largest_force_n);
 }
 
-fn row(run: usize, scenario: &Scenario) -> Row {
+fn judged(run: usize, scenario: &Scenario) -> Row {
     robustness::run_on(BuiltInPlant::new(scenario).unwrap(), run, scenario).unwrap()
 }
 
@@ -348,11 +348,11 @@ fn identified_arms_put_the_tip_where_they_say() {
             let deviation_m = prior(&actual, &drawn()).tip_deviation_m();
             careful.controller.estimator.tip_deviation_m = deviation_m as f32;
             set_down(&mut careful, run);
-            drawn_margin.push(row(run, &careful));
+            drawn_margin.push(judged(run, &careful));
             if let Ok(found) = &found {
                 let mut known = found.applied_to(&actual, "").unwrap();
                 let has_margin = set_down(&mut known, run);
-                let row = row(run, &known);
+                let row = judged(run, &known);
                 if has_margin {
                     with_margin.push(row.clone());
                 }
@@ -366,7 +366,7 @@ fn identified_arms_put_the_tip_where_they_say() {
                     arm_model: Some(drawn_joints),
                     ..known
                 };
-                geometry.push(row(run, &known));
+                geometry.push(judged(run, &known));
             }
         }
         match found {
