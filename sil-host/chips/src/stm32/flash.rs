@@ -21,13 +21,13 @@ pub struct FlashSlots {
     operations_left: Option<u32>,
     /// Number of operations.
     pub operations: u32,
-    /// Range that is being erased.
-    erasing: Option<(usize, usize)>,
+    /// Start of the range that the operation under way changes, and what was there before.
+    changing: Option<(usize, Vec<u8>)>,
     /// Whether one bit cannot be erased, by a defect.
     pub has_stuck_bit: bool,
     /// Whether an erasure takes both slots, by a defect.
     pub erases_both: bool,
-    /// Offsets of units that were written in part and cannot be corrected.
+    /// Offsets of units that were changed in part and cannot be corrected.
     uncorrectable: BTreeSet<u32>,
 }
 
@@ -51,7 +51,7 @@ impl FlashSlots {
             erasure: MILLISECOND,
             operations_left: None,
             operations: 0,
-            erasing: None,
+            changing: None,
             has_stuck_bit: false,
             erases_both: false,
             uncorrectable: BTreeSet::new(),
@@ -90,63 +90,89 @@ impl FlashSlots {
         self.uncorrectable.contains(&(offset & !7))
     }
 
-    fn begin(&mut self, until: Picoseconds) -> Power {
+    fn begin(&mut self, start: usize, length: usize, until: Picoseconds) -> Power {
         self.operations += 1;
-        match &mut self.operations_left {
+        self.busy_until = until;
+        self.changing = Some((start, self.bytes[start..start + length].to_vec()));
+        match self.operations_left {
             Some(0) => {
                 self.operations_left = None;
-                return Power::Failed;
+                Power::Failed
             }
-            Some(left) => *left -= 1,
-            None => {}
+            left => {
+                self.operations_left = left.map(|it| it - 1);
+                Power::On
+            }
         }
-        self.busy_until = until;
-        Power::On
     }
 
-    /// Erases a range from now on; its second half stays if the power fails.
+    /// Erases a range from now on.
     pub fn erase(&mut self, start: usize, length: usize, now: Picoseconds) -> Power {
-        let power = self.begin(now + self.erasure);
-        self.erasing = Some((start, length));
-        let erased = if power == Power::On {
-            length
-        } else {
-            length / 2
-        };
-        Arc::make_mut(&mut self.bytes)[start..start + erased].fill(0xff);
+        let power = self.begin(start, length, now + self.erasure);
+        let range = start..start + length;
+        let bytes = Arc::make_mut(&mut self.bytes);
+        bytes[range.clone()].fill(0xff);
         if self.erases_both {
-            Arc::make_mut(&mut self.bytes).fill(0xff);
+            bytes.fill(0xff);
         }
         if self.has_stuck_bit {
-            Arc::make_mut(&mut self.bytes)[start + STUCK] &= !1;
+            bytes[start + STUCK] &= !1;
         }
         self.uncorrectable
-            .retain(|it| !(start..start + erased).contains(&(*it as usize)));
+            .retain(|it| !range.contains(&(*it as usize)));
         power
     }
 
-    /// Clears the bits of a unit until `until`; half of it if the power fails.
+    /// Clears the bits of a unit until `until`.
     pub fn program(&mut self, start: usize, unit: &[u8], until: Picoseconds) -> Power {
-        let power = self.begin(until);
-        self.erasing = None;
-        let written = if power == Power::On {
-            unit.len()
-        } else {
-            self.uncorrectable.insert(start as u32 & !7);
-            unit.len() / 2
-        };
+        let power = self.begin(start, unit.len(), until);
         let bytes = Arc::make_mut(&mut self.bytes);
-        for (place, byte) in bytes[start..].iter_mut().zip(unit.iter().take(written)) {
+        for (place, byte) in bytes[start..].iter_mut().zip(unit) {
             *place &= byte;
         }
         power
     }
 
-    /// Ends an operation that a reset interrupts: what is being erased is neither erased nor what it was.
+    /// Ends an operation that a reset or a failure of the power interrupts: every other bit is as before, and no unit can
+    /// be corrected.
     pub fn reset(&mut self, now: Picoseconds) {
-        if let Some((start, length)) = self.erasing.take().filter(|_| self.is_busy(now)) {
-            Arc::make_mut(&mut self.bytes)[start + length / 2..start + length].fill(0x55);
-        }
+        let interrupted = self.changing.take().filter(|_| self.is_busy(now));
         self.busy_until = 0;
+        let Some((start, before)) = interrupted else {
+            return;
+        };
+        let bytes = Arc::make_mut(&mut self.bytes);
+        for (place, before) in bytes[start..].iter_mut().zip(&before) {
+            *place ^= (*place ^ before) & 0x55;
+        }
+        let units = (start & !7..start + before.len()).step_by(8);
+        self.uncorrectable.extend(units.map(|it| it as u32));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_a_reset_interrupts_is_half_done() {
+        let mut slots = FlashSlots::new(24);
+        for start in [0, 8] {
+            assert_eq!(slots.program(start, &[0; 8], 1), Power::On);
+        }
+        slots.reset(0);
+        assert_eq!(slots.bytes()[..8], [0; 8]);
+        assert_eq!(slots.bytes()[8..16], [0x55; 8]);
+        assert!(!slots.is_uncorrectable(4) && slots.is_uncorrectable(12));
+        slots.fail_in(0);
+        assert_eq!(slots.erase(0, 16, 0), Power::Failed);
+        slots.reset(0);
+        assert_eq!(slots.bytes()[..8], [0xaa; 8]);
+        assert_eq!(slots.bytes()[8..16], [0xff; 8]);
+        assert!(slots.is_uncorrectable(4) && slots.is_uncorrectable(12));
+        // One that has ended stays.
+        assert_eq!(slots.program(16, &[0; 8], 1), Power::On);
+        slots.reset(1);
+        assert_eq!(slots.bytes()[16..], [0; 8]);
     }
 }
