@@ -42,8 +42,10 @@ pub(super) struct Core<C> {
     pub(super) instruction_ps: Picoseconds,
     pub(super) cycles_per_instruction: u64,
     pub(super) systick: SysTick,
-    /// Largest delay of the entry into an exception, by a defect, and the state of its random numbers.
-    pub(super) latency: (Picoseconds, u64),
+    /// Largest delay of the entry into an exception, by a defect.
+    pub(super) latency: Picoseconds,
+    /// State of the random numbers.
+    pub(super) random: u64,
     pub(super) next_event: Picoseconds,
     pub(super) limit: Picoseconds,
     pub(super) instruction_limit: u64,
@@ -84,6 +86,15 @@ impl<C: Chip> Core<C> {
         if PERIPHERALS.iter().any(|it| it.contains(&address)) {
             self.registers.check(address, size, stored);
         }
+    }
+
+    /// Returns random bits: the upper half of Knuth's linear congruential generator.
+    pub(super) fn random(&mut self) -> u32 {
+        self.random = self
+            .random
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1);
+        (self.random >> 32) as u32
     }
 
     fn exception(&self, processor: &Processor) -> Option<Exception> {

@@ -31,7 +31,7 @@ impl<C: Chip> Machine<C> {
 
     /// Delays every entry into an exception by a random time up to this one.
     pub fn set_latency(&mut self, longest: Picoseconds) {
-        self.unicorn.surroundings_mut().latency.0 = longest;
+        self.unicorn.surroundings_mut().latency = longest;
     }
 
     /// Changes a bit of the flash wherever it holds this word; returns the number of places.

@@ -49,12 +49,8 @@ impl<C: Chip> Machine<C> {
             HARD_FAULT.min(exception)
         };
         // A delay by a defect: the same instructions take longer.
-        let (longest, random) = &mut core.latency;
-        if *longest > 0 {
-            *random = random
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1);
-            let delay = (*random >> 33) % *longest;
+        if core.latency > 0 {
+            let delay = u64::from(core.random()) % core.latency;
             core.now += delay;
             let hz = u128::from(core.chip.core_hz());
             core.cycles += (u128::from(delay) * hz / u128::from(crate::SECOND)) as u64;

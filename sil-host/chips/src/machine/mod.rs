@@ -136,7 +136,8 @@ impl<C: Chip> Machine<C> {
             instruction_ps: 0,
             cycles_per_instruction: CYCLES_PER_INSTRUCTION,
             systick: SysTick::default(),
-            latency: (0, 1),
+            latency: 0,
+            random: 1,
             next_event: 0,
             limit: 0,
             instruction_limit: u64::MAX,
@@ -254,7 +255,7 @@ impl<C: Chip> Machine<C> {
         found.map(|(_, address)| *address)
     }
 
-    /// Resets the microcontroller; memory keeps its contents.
+    /// Resets the microcontroller; memory keeps its contents unless the supply has failed.
     pub fn reset(&mut self, reset: Reset) {
         let core = self.unicorn.surroundings_mut();
         core.chip.reset(reset, core.now);
@@ -264,6 +265,11 @@ impl<C: Chip> Machine<C> {
         core.refresh();
         let now = core.now;
         self.resets.push((now, reset));
+        if matches!(reset, Reset::Power | Reset::BrownOut) {
+            let ram = (0..C::RAM.1 / 4).flat_map(|_| core.random().to_le_bytes());
+            let ram: Vec<u8> = ram.collect();
+            self.unicorn.processor().write_memory(C::RAM.0, &ram);
+        }
         let mut vectors = [0; 8];
         self.unicorn
             .processor()
