@@ -16,6 +16,9 @@ pub const HARD_FAULT: Exception = 3;
 /// The SysTick timer's exception.
 const SYSTICK: Exception = 15;
 
+/// Bit of DEMCR that switches the trace unit on.
+const TRACE_ON: u32 = 1 << 24;
+
 /// Implemented bits of a priority, from the top of its byte.
 const PRIORITY_MASK: u8 = 0xf0;
 
@@ -48,9 +51,11 @@ pub struct SystemControl {
     pub vector_table: u32,
     /// Whether a reset has been requested.
     pub reset_requested: bool,
-    /// Whether the cycle counter is enabled, and the cycle at which it was 0.
+    /// Whether the cycle counter is enabled, its count when it was last written, and the cycle of that.
     cycle_counter_enabled: bool,
-    cycle_counter_zero: u64,
+    count: u32,
+    counted_from: u64,
+    /// Debug exception and monitor control (DEMCR).
     trace: u32,
     coprocessor_access: u32,
     floating_point_context: u32,
@@ -82,7 +87,8 @@ impl SystemControl {
             vector_table: 0,
             reset_requested: false,
             cycle_counter_enabled: false,
-            cycle_counter_zero: 0,
+            count: 0,
+            counted_from: 0,
             trace: 0,
             coprocessor_access: 0,
             floating_point_context: 0xc000_0000,
@@ -184,13 +190,26 @@ impl SystemControl {
         self.active.pop()
     }
 
+    /// Returns whether the trace unit is on: without it, the cycle counter has no registers.
+    fn has_trace(&self) -> bool {
+        self.trace & TRACE_ON != 0
+    }
+
+    fn cycle_count(&self, cycles: u64) -> u32 {
+        if self.has_trace() && self.cycle_counter_enabled {
+            self.count.wrapping_add((cycles - self.counted_from) as u32)
+        } else {
+            self.count
+        }
+    }
+
     /// Handles a load of a word.
     pub fn read(&self, address: u32, cycles: u64) -> u32 {
         let word = |bits: u128, first: u32| (bits >> ((address - first) * 8)) as u32;
         match address {
-            0xe000_1000 => u32::from(self.cycle_counter_enabled) | 0x4000_0000,
-            0xe000_1004 if self.cycle_counter_enabled => (cycles - self.cycle_counter_zero) as u32,
-            0xe000_1004 | 0xe000_1fb4 | 0xe000_1fb0 => 0,
+            0xe000_1000 if self.has_trace() => u32::from(self.cycle_counter_enabled) | 0x4000_0000,
+            0xe000_1004 if self.has_trace() => self.cycle_count(cycles),
+            0xe000_1000 | 0xe000_1004 | 0xe000_1fb4 | 0xe000_1fb0 => 0,
             0xe000_e100..0xe000_e110 => word(self.enabled, 0xe000_e100),
             0xe000_e180..0xe000_e190 => word(self.enabled, 0xe000_e180),
             0xe000_e200..0xe000_e210 => word(self.pending(), 0xe000_e200),
@@ -229,11 +248,14 @@ impl SystemControl {
     /// Handles a store of a word, or of a byte for priorities.
     pub fn write(&mut self, address: u32, size: u32, value: u32, cycles: u64) {
         let bits = |first: u32| u128::from(value) << ((address - first) * 8);
+        if matches!(address, 0xe000_1000 | 0xe000_1004 | 0xe000_edfc) {
+            self.count = self.cycle_count(cycles);
+            self.counted_from = cycles;
+        }
         match address {
-            0xe000_1000 => {
-                self.cycle_counter_enabled = value & 1 != 0;
-            }
-            0xe000_1004 => self.cycle_counter_zero = cycles.wrapping_sub(value.into()),
+            0xe000_1000 if self.has_trace() => self.cycle_counter_enabled = value & 1 != 0,
+            0xe000_1004 if self.has_trace() => self.count = value,
+            0xe000_1000 | 0xe000_1004 => {}
             // The lock of the trace unit, which this processor lacks.
             0xe000_1fb0 => {}
             0xe000_e100..0xe000_e110 => self.enabled |= bits(0xe000_e100),
