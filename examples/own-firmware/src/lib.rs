@@ -1,12 +1,12 @@
 //! The arm on a board of one's own. Nothing here depends on the chip: drivers and timer fill the first five values, and
-//! drivers put out the last two.
+//! drivers put out the last two. One interrupt must fill all values of a sample.
 
 #![no_std]
 
 #[cfg(test)]
 mod tests;
 
-use core::sync::atomic::{AtomicBool, AtomicI32, AtomicU32, Ordering::Relaxed};
+use core::sync::atomic::{AtomicBool, AtomicI32, AtomicU32, Ordering::*, fence};
 
 use painleve_firmware::counts::{EncoderCounts, ForceCounts};
 use painleve_firmware::drive::Drive;
@@ -31,12 +31,17 @@ impl Drive for Arm {
         self.frame.tick = TICKS.load(Relaxed);
     }
     fn sample(&mut self) -> Option<SensorFrame> {
-        let before = core::mem::replace(&mut self.frame.sequence, SAMPLES.load(Relaxed));
-        self.frame.joints = [0, 1].map(|joint: usize| EncoderCounts(ENCODERS[joint].load(Relaxed)));
-        self.frame.normal_force = ForceCounts(FORCES[0].load(Relaxed));
-        self.frame.tangential_force = ForceCounts(FORCES[1].load(Relaxed));
-        self.frame.inputs = DigitalInputs(INPUTS.load(Relaxed));
-        (self.frame.sequence != before).then_some(self.frame)
+        let mut frame = self.frame;
+        frame.sequence = SAMPLES.load(Acquire);
+        frame.joints = [0, 1].map(|joint: usize| EncoderCounts(ENCODERS[joint].load(Relaxed)));
+        frame.normal_force = ForceCounts(FORCES[0].load(Relaxed));
+        frame.tangential_force = ForceCounts(FORCES[1].load(Relaxed));
+        frame.inputs = DigitalInputs(INPUTS.load(Relaxed));
+        fence(Acquire);
+        // If another sample has come meanwhile, the next tick has it whole.
+        let is_whole = SAMPLES.load(Relaxed) == frame.sequence;
+        let before = core::mem::replace(&mut self.frame, frame).sequence;
+        (is_whole && frame.sequence != before).then_some(frame)
     }
     fn actuate(&mut self, answer: &ActuatorFrame) {
         TORQUES[0].store(answer.torques[0].0, Relaxed);

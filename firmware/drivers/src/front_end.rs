@@ -102,6 +102,7 @@ impl FrontEnd {
         let heating_model = settings
             .as_ref()
             .and_then(|it| HeatingModel::new(&it.winding, &it.stages, &it.torque, it.tick_hz));
+        let tick_hz = settings.as_ref().map_or(0.0, |it| it.tick_hz);
         let bits = settings.as_ref().map_or((0, 0), |it| {
             let [encoder, _] = it.encoders;
             (encoder.bits, it.force.bits)
@@ -109,7 +110,7 @@ impl FrontEnd {
         Self {
             settings,
             checks: Checks::new(gap, heating_model, bits),
-            switches: Switches::default(),
+            switches: Switches::new(tick_hz),
             readings: SensorReadings::default(),
             has_new_joints: false,
             has_new_forces: false,
@@ -170,9 +171,17 @@ impl FrontEnd {
             SensorParts::Second => mounting.second_encoder_reversed,
         };
         let [joint_1, joint_2] = encoders.readings(scale.bits);
+        let magnets = encoders.magnets();
+        // An encoder that has lost its magnet may repeat its last angle. Before arming, the checks refuse it by name.
+        let is_active = self.is_active;
+        let is_angle = |magnet: Option<bool>| !is_active || magnet != Some(false);
+        let reading = |joint: Result<EncoderCounts, ReadError>, reversed, magnet| {
+            let counts = joint.ok().filter(|_| is_angle(magnet))?;
+            Some(turned(counts, reversed))
+        };
         self.readings.joints = [
-            joint_1.ok().map(|it| turned(it, reversed_1)),
-            joint_2.ok().map(|it| turned(it, reversed_2)),
+            reading(joint_1, reversed_1, magnets[0]),
+            reading(joint_2, reversed_2, magnets[1]),
         ];
         if mounting.sensors == SensorParts::Both {
             let tolerance = Tolerance {
@@ -188,7 +197,7 @@ impl FrontEnd {
             confirm(channels, joints, pairs, reversed, tolerance, self.is_active);
         }
         self.has_new_joints = true;
-        self.readings.magnets = encoders.magnets();
+        self.readings.magnets = magnets;
     }
 
     /// Takes the readings of a complete set of the force cell for the next frame.
@@ -232,7 +241,7 @@ impl FrontEnd {
     /// permission and, before the drive is armed, with plausible readings and ready stages.
     pub fn frame(&mut self, levels: InputLevels) -> SensorFrame {
         let mut inputs = self.switches.tick(levels.enable, levels.reset);
-        self.note_button(levels);
+        self.note_button(inputs.contains(DigitalInputs::RESET), levels.enable);
         let readings = &mut self.readings;
         let Verdict {
             contradiction,
@@ -271,7 +280,7 @@ impl FrontEnd {
             let is_refused = !is_ready && plausible != Err(Implausible::NotYet);
             let is_wanted = self.may_arm && inputs.contains(DigitalInputs::ENABLE);
             inputs.set(DigitalInputs::ARMING_REFUSED, is_wanted && is_refused);
-            inputs.set(DigitalInputs::ENABLE, is_wanted && is_ready);
+            inputs.set(DigitalInputs::ENABLE, is_wanted && is_ready && self.is_fit);
         }
         if !self.may_arm {
             inputs.remove(DigitalInputs::ENABLE);
@@ -295,16 +304,16 @@ impl FrontEnd {
     }
 
     /// Permits arming once the button has been pressed for long enough: a deliberate act of an operator who has
-    /// opened ENABLE.
-    fn note_button(&mut self, levels: InputLevels) {
-        if levels.enable || !levels.reset {
-            self.pressed_ticks = 0;
-            return;
-        }
-        self.pressed_ticks = self.pressed_ticks.saturating_add(1);
+    /// opened ENABLE. A press permits once: a line that is stuck high does not permit again.
+    fn note_button(&mut self, is_pressed: bool, is_enabled: bool) {
+        self.pressed_ticks = match (is_pressed, is_enabled) {
+            (false, _) => 0,
+            (true, true) => u32::MAX,
+            (true, false) => self.pressed_ticks.saturating_add(1),
+        };
         let settings = self.settings.as_ref();
         let limit = settings.and_then(|it| it.button_ticks);
-        self.may_arm |= limit.is_some_and(|limit| self.pressed_ticks >= limit);
+        self.may_arm |= limit == Some(self.pressed_ticks);
     }
 }
 

@@ -63,10 +63,9 @@ impl<F: NorFlash> Slots<F> {
     /// Reads the newest content into `buffer`; `None` if no slot is intact.
     #[inline(never)]
     pub fn newest(&mut self, buffer: &mut [u8]) -> Option<Content> {
-        let (slot, content) = self.newest_slot(buffer)?;
-        // The other slot may have been read last.
-        self.read(slot, buffer);
-        Some(content)
+        let (slot, _) = self.newest_slot(buffer)?;
+        // The other slot may have been read last, and half-erased cells may read differently.
+        self.read(slot, buffer)
     }
 
     /// Stores a content as the newest version, which it returns. `buffer` has room for the longest content.

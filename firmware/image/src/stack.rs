@@ -29,7 +29,7 @@ pub fn paint() {
     let mut word = addr_of_mut!(_stack_end);
     let top = (cortex_m::register::msp::read() as usize - MARGIN_BYTES) as *mut u32;
     while word < top {
-        // SAFETY: nothing uses the memory between static memory and the margin below the stack
+        // SAFETY: nothing uses the memory between the end of the stack and the margin below the stack
         // pointer; both ends are aligned to words.
         unsafe {
             word.write_volatile(PAINT);
@@ -80,7 +80,7 @@ extern "C" fn resume<F: FnOnce() -> Infallible>(held: *mut ()) -> ! {
 pub fn high_water_bytes() -> u32 {
     let mut word = addr_of_mut!(_stack_end);
     let top = addr_of_mut!(_stack_start);
-    // SAFETY: reads words of RAM from the end of static memory to the start of the stack; a value
+    // SAFETY: reads the words of the stack; a value
     // that changes during the read does no harm.
     while word < top && unsafe { word.read_volatile() } == PAINT {
         word = word.wrapping_add(1);

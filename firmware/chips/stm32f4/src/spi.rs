@@ -23,9 +23,10 @@ impl<I: Deref<Target = RegisterBlock>> SpiWords for SpiPort<I> {
         if flags.rxne().bit_is_clear() {
             return None;
         }
-        // Reading data, then flags, clears an overrun.
         let word = self.0.dr().read().bits();
-        if flags.ovr().bit_is_set() && self.0.sr().read().ovr().bit_is_set() {
+        if flags.ovr().bit_is_set() {
+            // Reading data, then flags, clears an overrun.
+            let _ = self.0.sr().read();
             return Some(Err(Overrun));
         }
         Some(Ok(word as u16))

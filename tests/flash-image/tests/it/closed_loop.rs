@@ -40,7 +40,7 @@ fn gives_the_torques_of_a_pc<C: BoardChip>() {
             .joint_range_nm(range_nm as f32)
             .map(|it| f64::from(it) / range_nm);
         let mut controller = Controller::new(&scenario.controller_configuration()).unwrap();
-        let mut switches = Switches::default();
+        let mut switches = Switches::new(scenario.run.tick_hz as f32);
         let mut bench = Bench::<C>::new(&scenario);
         bench.gear = gear;
         let mut answer = |tick, closed, sampled| {

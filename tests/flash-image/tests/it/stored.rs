@@ -111,6 +111,20 @@ fn drives_the_arm_without_a_host<C: BoardChip>(erasure: Picoseconds) {
     assert!(!is_driven(&bench));
     close_enable(&mut bench, true);
     bench.assert_stays_off(50);
+    // A button that is stuck permits once.
+    close_enable(&mut bench, false);
+    bench.drive_pin(RESET, Some(true));
+    for _ in 0..1010 {
+        bench.tick();
+    }
+    close_enable(&mut bench, true);
+    assert!(is_driven(&bench));
+    close_enable(&mut bench, false);
+    for _ in 0..1100 {
+        bench.tick();
+    }
+    close_enable(&mut bench, true);
+    bench.assert_stays_off(50);
     assert_eq!(bench.board.resets(), [Reset::Power]);
 }
 

@@ -63,7 +63,8 @@ fn board<C: BoardChip>(seed: u64, defect: Option<Defect>) -> EmulatedPort<C> {
 
 fn acceptance<C: BoardChip>(seed: u64, defect: Option<Defect>) -> Acceptance {
     let board = Serial::over(board::<C>(seed, defect)).unwrap();
-    accept(board, |_| ControlFlow::Continue(())).unwrap_or_else(|error| panic!("seed {seed}, {defect:?}: {error}"))
+    accept(board, |_| ControlFlow::Continue(()))
+        .unwrap_or_else(|error| panic!("seed {seed}, {defect:?}: {error}"))
 }
 
 /// Returns what has failed, for messages.

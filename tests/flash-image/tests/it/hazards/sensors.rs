@@ -20,6 +20,7 @@ crate::on_each_board! {
     sensors_that_die_take_the_torque_off,
     a_force_cell_that_dies_takes_the_torque_off,
     an_encoder_that_freezes_takes_the_torque_off,
+    an_encoder_that_loses_its_magnet_takes_the_torque_off,
     a_torque_stage_that_is_not_ready_takes_the_torque_off,
     a_winding_that_becomes_too_hot_takes_the_torque_off,
     arming_on_implausible_readings_is_refused_with_a_fault,
@@ -86,6 +87,25 @@ fn an_encoder_that_freezes_takes_the_torque_off<C: BoardChip>() {
         println!("encoder {encoder}: {fault:?} after {harm:?}");
         assert!(fault.is_some());
         bench.assert_stays_off(100);
+    }
+}
+
+/// The only encoder of a joint repeats its last angle and says why; its diagnostics are read every 64 ticks.
+fn an_encoder_that_loses_its_magnet_takes_the_torque_off<C: BoardChip>() {
+    const TOO_WEAK: u16 = 0x0980;
+    for encoder in 0..2 {
+        let mut bench = Bench::<C>::new(&with_one_sensor(DEFAULT));
+        bench.drive();
+        bench.is_frozen[encoder] = true;
+        bench.board.wiring().encoders[encoder].diagnostics = TOO_WEAK;
+        let mut ticks = 0;
+        while !bench.board.torque().is_off() {
+            bench.tick();
+            ticks += 1;
+            assert!(ticks < 80, "encoder {encoder}");
+        }
+        bench.assert_stays_off(100);
+        assert_eq!(latched_fault(&mut bench), Some(Fault::EncoderOutOfRange));
     }
 }
 
