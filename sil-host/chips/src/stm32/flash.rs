@@ -6,6 +6,12 @@ use std::sync::Arc;
 
 use crate::{MILLISECOND, Picoseconds};
 
+/// Keys that open the control register.
+pub const CONTROL_KEYS: [u32; 2] = [0x4567_0123, 0xcdef_89ab];
+
+/// Keys that open the option bytes.
+pub const OPTION_KEYS: [u32; 2] = [0x0819_2a3b, 0x4c5d_6e7f];
+
 /// Offset in a slot of a bit that cannot be erased.
 const STUCK: usize = 40;
 
@@ -29,6 +35,16 @@ pub struct FlashSlots {
     pub erases_both: bool,
     /// Offsets of units that were changed in part and cannot be corrected.
     uncorrectable: BTreeSet<u32>,
+}
+
+/// Takes a key for a register that two keys open, of which `taken` have come; returns whether it opens now.
+///
+/// # Panics
+/// If the key is wrong: the register then stays locked until a reset.
+pub fn take_key(keys: [u32; 2], taken: &mut usize, key: u32) -> bool {
+    assert_eq!(key, keys[*taken], "a wrong key locks the flash's register");
+    *taken = (*taken + 1) % 2;
+    *taken == 0
 }
 
 /// What an operation has come to.

@@ -10,7 +10,7 @@ mod watchdog;
 
 pub use adc::{Adc, AdcLayout};
 pub use dac::Dac;
-pub use flash::{FlashSlots, Power};
+pub use flash::{CONTROL_KEYS, FlashSlots, OPTION_KEYS, Power, take_key};
 pub use gpio::{Gpio, GpioReset};
 pub use timer::Timer;
 pub use usart::{Usart, UsartLayout};
@@ -146,6 +146,13 @@ pub trait WiredChip: Chip {
 
     /// Returns the time of the control timer's next interrupt.
     fn next_tick(&self) -> Picoseconds;
+}
+
+/// Returns whether a clock is within its limit, but for the tolerance of the crystal.
+pub fn is_within(hz: u64, limit_hz: u64) -> bool {
+    /// Largest part by which a crystal is too fast: 1 / 5000.
+    const CRYSTAL: u64 = 5000;
+    hz - hz / CRYSTAL <= limit_hz
 }
 
 /// Checks the pins of an SPI bus (0 for SPI1) before a transfer: clock, input and output, all on port B.

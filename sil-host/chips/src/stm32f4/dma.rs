@@ -3,8 +3,26 @@
 use crate::unicorn::Processor;
 
 const ENABLED: u32 = 1;
+const MEMORY_INCREMENT: u32 = 1 << 10;
+
+/// Control by the peripheral, memory to memory, increments, widths, two buffers, bursts.
+const MODE: u32 = 1 << 5 | 1 << 7 | 0x7f << 9 | 1 << 18 | 15 << 21;
+
 const HALF: u32 = 1 << 4;
 const COMPLETE: u32 = 1 << 5;
+
+/// A peripheral's request (RM0090, tables 42 and 43).
+#[derive(Clone, Copy, Debug)]
+pub struct Request {
+    /// Streams to which it is wired.
+    pub streams: &'static [usize],
+    /// Its channel at these streams.
+    pub channel: u32,
+    /// Address of the data register.
+    pub data: u32,
+    /// Whether the peripheral is read.
+    pub to_memory: bool,
+}
 
 /// One stream.
 #[derive(Clone, Debug, Default)]
@@ -71,6 +89,8 @@ impl Dma {
                     0x00 => {
                         if value & ENABLED != 0 && !is_enabled {
                             assert_eq!(self.flags[number], 0, "flags of stream {number}");
+                            let mode = value & MODE;
+                            assert_eq!(mode, MEMORY_INCREMENT, "mode of stream {number}");
                             stream.length = stream.left;
                         }
                         stream.control = value;
@@ -86,40 +106,40 @@ impl Dma {
         }
     }
 
-    /// Returns the stream that serves a peripheral's data register in a direction, if one is
-    /// enabled.
-    fn serving(&mut self, data: u32, to_memory: bool) -> Option<usize> {
-        let direction = if to_memory { 0 } else { 1 };
-        self.streams.iter().position(|it| {
+    fn serving(&self, request: Request) -> Option<usize> {
+        let direction = if request.to_memory { 0 } else { 1 };
+        request.streams.iter().copied().find(|number| {
+            let it = &self.streams[*number];
             it.control & ENABLED != 0
+                && it.control >> 25 & 7 == request.channel
                 && it.control >> 6 & 3 == direction
-                && it.peripheral == data
+                && it.peripheral == request.data
                 && it.left > 0
         })
     }
 
-    /// Returns whether a peripheral's requests are served.
-    pub fn serves(&mut self, data: u32, to_memory: bool) -> bool {
-        self.serving(data, to_memory).is_some()
+    /// Returns whether a request is served.
+    pub fn serves(&self, request: Request) -> bool {
+        self.serving(request).is_some()
     }
 
     /// Moves one byte from a peripheral to memory.
-    pub fn store_byte(&mut self, data: u32, byte: u8, memory: &Processor) {
-        if let Some(place) = self.next(data, true) {
+    pub fn store_byte(&mut self, request: Request, byte: u8, memory: &Processor) {
+        if let Some(place) = self.next(request) {
             memory.write_memory(place, &[byte]);
         }
     }
 
     /// Moves one byte from memory to a peripheral.
-    pub fn load_byte(&mut self, data: u32, memory: &Processor) -> Option<u8> {
-        let place = self.next(data, false)?;
+    pub fn load_byte(&mut self, request: Request, memory: &Processor) -> Option<u8> {
+        let place = self.next(request)?;
         let mut byte = [0];
         memory.read_memory(place, &mut byte);
         Some(byte[0])
     }
 
-    fn next(&mut self, data: u32, to_memory: bool) -> Option<u32> {
-        let number = self.serving(data, to_memory)?;
+    fn next(&mut self, request: Request) -> Option<u32> {
+        let number = self.serving(request)?;
         let stream = &mut self.streams[number];
         let place = stream.memory + (stream.length - stream.left);
         stream.left -= 1;

@@ -5,15 +5,16 @@ mod dma;
 mod rcc;
 mod spi;
 
-use self::dma::Dma;
+use self::dma::{Dma, Request};
 use self::rcc::Rcc;
 use self::spi::Spi;
 use crate::bit_band::bit_band;
 use crate::machine::{Chip, Reset};
 use crate::stm32::{
-    Adc, AdcLayout, Crystal, Dac, FlashSlots, Gpio, GpioReset, Individual, Outside, Pin, PinLevel,
-    PinMode, Power, Timer, Usart, UsartLayout, Watchdog, WindowWatchdog, WiredChip, carry,
-    check_function, check_spi_pins, expired, store_port,
+    Adc, AdcLayout, CONTROL_KEYS, Crystal, Dac, FlashSlots, Gpio, GpioReset, Individual,
+    OPTION_KEYS, Outside, Pin, PinLevel, PinMode, Power, Timer, Usart, UsartLayout, Watchdog,
+    WindowWatchdog, WiredChip, carry, check_function, check_spi_pins, expired, is_within,
+    store_port, take_key,
 };
 use crate::unicorn::Processor;
 use crate::{MICROSECOND, MILLISECOND, Picoseconds};
@@ -30,8 +31,19 @@ const DMA2_STREAMS: [usize; 8] = [56, 57, 58, 59, 60, 68, 69, 70];
 const USART_PINS: [usize; 2] = [9, 10];
 const USART_FUNCTION: u8 = 7;
 
-/// Addresses of data registers that DMA serves.
-const USART1_DATA: u32 = 0x4001_1004;
+/// Requests of USART1 at DMA2.
+const RECEIVED: Request = Request {
+    streams: &[2, 5],
+    channel: 4,
+    data: 0x4001_1004,
+    to_memory: true,
+};
+const TO_SEND: Request = Request {
+    streams: &[7],
+    channel: 4,
+    data: 0x4001_1004,
+    to_memory: false,
+};
 
 /// Bits of the flash's control register (RM0090, section 3.9.5).
 const LOCK: u32 = 1 << 31;
@@ -42,6 +54,14 @@ const WIDTH: u32 = 3 << 8;
 
 /// Error of an operation in a protected sector.
 const WRITE_PROTECTED: u32 = 1 << 4;
+
+/// Bit of PWR_CR for the regulator's first scale.
+const FULL_SCALE: u32 = 1 << 14;
+
+/// Highest clock in either scale, and per wait state of the flash, Hz.
+const FASTEST_HZ: u64 = 168_000_000;
+const SECOND_SCALE_HZ: u64 = 144_000_000;
+const PER_WAIT_STATE_HZ: u64 = 30_000_000;
 
 /// Stores of four bytes.
 const WORDS: u32 = 2 << 8;
@@ -105,8 +125,8 @@ pub struct Stm32f4<O> {
     loaded_options: u32,
     /// Time until which the option bytes are programmed.
     options_busy_until: Picoseconds,
-    /// Number of keys that have opened the flash's control register.
-    keys: usize,
+    /// Number of keys that have come for the flash's control register and for the option bytes.
+    keys: [usize; 2],
     syscfg: [u32; 16],
     external_interrupts: [u32; 8],
     reset: Option<Reset>,
@@ -140,7 +160,7 @@ impl<O: Outside> Stm32f4<O> {
             programmed_options: USUAL_OPTIONS,
             loaded_options: USUAL_OPTIONS,
             options_busy_until: 0,
-            keys: 0,
+            keys: [0; 2],
             syscfg: [0; 16],
             external_interrupts: [0; 8],
             reset: None,
@@ -230,6 +250,7 @@ impl<O: Outside> Stm32f4<O> {
                 let was_low = self.supply_is_low();
                 self.power[usize::from(offset != 0)] = value;
                 self.note_supply(was_low);
+                self.check_clock();
             }
             0x4000_7400 if self.rcc.is_on(0x40, 29) => self.dac.write(offset, value),
             0x4001_1000 if self.rcc.is_on(0x44, 4) => self.usart.write(offset, value, fast, now),
@@ -259,11 +280,15 @@ impl<O: Outside> Stm32f4<O> {
             }
             0x4002_3800 => {
                 self.rcc.write(offset, value, now);
+                self.check_clock();
                 if self.rcc.is_on(0x20, 0) {
                     self.timer.reset();
                 }
             }
-            0x4002_3c00 => self.store_flash(offset, value, now),
+            0x4002_3c00 => {
+                self.store_flash(offset, value, now);
+                self.check_clock();
+            }
             0x4002_6000 if self.rcc.is_on(0x30, 21) => self.dma[0].write(offset, value),
             0x4002_6400 if self.rcc.is_on(0x30, 22) => self.dma[1].write(offset, value),
             0x4000_0000 | 0x4000_2c00 | 0x4000_3800 | 0x4000_7000 | 0x4000_7400 | 0x4001_1000
@@ -274,20 +299,39 @@ impl<O: Outside> Stm32f4<O> {
         }
     }
 
+    /// Checks buses, regulator and flash for the clock (RM0090, sections 3.5.1 and 5.1.3, at 2.7 V to 3.6 V).
+    fn check_clock(&self) {
+        let core_hz = self.rcc.core_hz();
+        let regulator_hz = if self.power[0] & FULL_SCALE != 0 {
+            FASTEST_HZ
+        } else {
+            SECOND_SCALE_HZ
+        };
+        let wait_states = u64::from(self.flash_control[0] & 7);
+        assert!(
+            is_within(core_hz, regulator_hz)
+                && is_within(self.rcc.slow_bus_hz(), FASTEST_HZ / 4)
+                && is_within(self.rcc.fast_bus_hz(), FASTEST_HZ / 2)
+                && is_within(core_hz, (wait_states + 1) * PER_WAIT_STATE_HZ),
+            "{core_hz} Hz with {wait_states} wait states"
+        );
+    }
+
     /// Handles the keys that unlock the option bytes, which hold the brown-out level, and those that unlock the
     /// control register.
     fn store_flash(&mut self, offset: u32, value: u32, now: Picoseconds) {
         let is_open = self.flash_control[4] & LOCK == 0;
-        match (offset, value) {
-            (0x04, 0x4567_0123) => self.keys = 1,
-            (0x04, 0xcdef_89ab) if self.keys == 1 => self.flash_control[4] &= !LOCK,
-            (0x0c, _) => self.flash_errors &= !value,
-            (0x04, _) => {}
-            (0x10, _) if !is_open => {}
-            (0x10, _) => {
+        match offset {
+            0x04 if take_key(CONTROL_KEYS, &mut self.keys[0], value) => {
+                self.flash_control[4] &= !LOCK;
+            }
+            0x08 if take_key(OPTION_KEYS, &mut self.keys[1], value) => {
+                self.flash_control[5] &= !OPTION_LOCK;
+            }
+            0x0c => self.flash_errors &= !value,
+            0x10 if is_open => {
                 assert!(!self.flash_is_busy(now), "the flash is busy");
                 self.flash_control[4] = value & !START;
-                self.keys *= usize::from(value & LOCK == 0);
                 if value & START != 0 && value & SECTOR_ERASE != 0 {
                     assert_eq!(value & WIDTH, WORDS, "the width of an erasure");
                     let slot = (value >> 3 & 15) - FIRST_SECTOR;
@@ -298,11 +342,7 @@ impl<O: Outside> Stm32f4<O> {
                     self.note_power(power);
                 }
             }
-            (0x08, 0x0819_2a3b) => self.flash_control[2] = 1,
-            (0x08, 0x4c5d_6e7f) if self.flash_control[2] == 1 => {
-                self.flash_control[5] &= !OPTION_LOCK;
-            }
-            (0x14, _) if self.flash_control[5] & OPTION_LOCK == 0 => {
+            0x14 if self.flash_control[5] & OPTION_LOCK == 0 => {
                 assert!(!self.flash_is_busy(now), "the flash is busy");
                 self.flash_control[5] = value & !OPTION_START;
                 if value & OPTION_START != 0 {
@@ -310,9 +350,8 @@ impl<O: Outside> Stm32f4<O> {
                     self.options_busy_until = now + OPTION_TIME;
                 }
             }
-            (0x14, _) => {}
-            (0x08, _) => {}
-            _ => self.flash_control[((offset / 4) & 7) as usize] = value,
+            0x00 => self.flash_control[0] = value,
+            _ => {}
         }
     }
 }
@@ -391,9 +430,9 @@ impl<O: Outside> Chip for Stm32f4<O> {
         self.adc = Adc::new(AdcLayout::Plain);
         self.dma = Default::default();
         self.power = [0x4000, 0];
-        self.flash_control[2] = 0;
+        self.flash_control[0] = 0;
         self.flash_control[4] = LOCK;
-        self.keys = 0;
+        self.keys = [0; 2];
         self.flash_errors = 0;
         self.slots.reset(now);
         self.load_options();
@@ -448,13 +487,13 @@ impl<O: Outside> Chip for Stm32f4<O> {
         }
         loop {
             self.usart.advance(fast, now);
-            if self.usart.wants_reading() && self.dma[1].serves(USART1_DATA, true) {
+            if self.usart.wants_reading() && self.dma[1].serves(RECEIVED) {
                 check_function(&self.ports[0], USART_PINS, USART_FUNCTION);
                 let byte = self.usart.take();
-                self.dma[1].store_byte(USART1_DATA, byte, memory);
+                self.dma[1].store_byte(RECEIVED, byte, memory);
             }
             if self.usart.wants_writing()
-                && let Some(byte) = self.dma[1].load_byte(USART1_DATA, memory)
+                && let Some(byte) = self.dma[1].load_byte(TO_SEND, memory)
             {
                 check_function(&self.ports[0], USART_PINS, USART_FUNCTION);
                 self.usart.bring(byte, fast, now);
@@ -469,14 +508,14 @@ impl<O: Outside> Chip for Stm32f4<O> {
 
     fn next_event(&self) -> Picoseconds {
         let timer = self.timer.next_event(self.rcc.slow_timer_hz());
-        let dma = self.usart.wants_writing() && self.dma[1].clone().serves(USART1_DATA, false);
+        let sends = self.usart.wants_writing() && self.dma[1].serves(TO_SEND);
         let spis = self.spis[0].next_event().min(self.spis[1].next_event());
         timer
             .min(spis)
             .min(self.usart.next_event())
             .min(self.watchdog.expires())
             .min(self.window_watchdog.expires())
-            .min(if dma { 0 } else { Picoseconds::MAX })
+            .min(if sends { 0 } else { Picoseconds::MAX })
     }
 
     /// The flash has one bank.

@@ -86,8 +86,13 @@ impl Rcc {
         self.crystal_works && self.control & HSE_ON != 0 && now >= self.hse_ready_at
     }
 
+    /// The loop needs its source before it is switched on, and as long as it runs.
     fn pll_is_ready(&self, now: Picoseconds) -> bool {
-        self.control & PLL_ON != 0 && now >= self.pll_ready_at
+        self.control & PLL_ON != 0 && now >= self.pll_ready_at && self.pll_has_source(now)
+    }
+
+    fn pll_has_source(&self, now: Picoseconds) -> bool {
+        self.pll & 1 << 22 == 0 || self.crystal_is_ready(now)
     }
 
     /// Handles a load.
@@ -119,11 +124,19 @@ impl Rcc {
                     self.hse_ready_at = now + CRYSTAL_START;
                 }
                 if value & !self.control & PLL_ON != 0 {
-                    self.pll_ready_at = now + LOCK;
+                    let has_source = self.pll_has_source(now);
+                    self.pll_ready_at = if has_source {
+                        now + LOCK
+                    } else {
+                        Picoseconds::MAX
+                    };
                 }
                 self.control = value;
             }
-            0x04 => self.pll = value,
+            0x04 => {
+                assert_eq!(self.control & PLL_ON, 0, "the phase-locked loop is on");
+                self.pll = value;
+            }
             0x08 => {
                 let is_ready = match value & 3 {
                     0 => true,

@@ -5,6 +5,10 @@ use crate::unicorn::Processor;
 
 const ENABLED: u32 = 1;
 const CIRCULAR: u32 = 1 << 5;
+const MEMORY_INCREMENT: u32 = 1 << 7;
+
+/// Increments, widths, memory to memory.
+const MODE: u32 = 0x3f << 6 | 1 << 14;
 
 /// One channel, with its part of the multiplexer.
 #[derive(Clone, Copy, Debug, Default)]
@@ -66,6 +70,8 @@ impl Dma {
         match register {
             0x00 => {
                 if value & ENABLED != 0 && !is_enabled {
+                    let mode = value & MODE;
+                    assert_eq!(mode, MEMORY_INCREMENT, "mode of channel {number}");
                     channel.length = channel.left;
                 }
                 channel.control = value;

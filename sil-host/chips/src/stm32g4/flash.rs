@@ -1,6 +1,6 @@
 //! The flash's registers and the pages that keep configurations (RM0440, chapter FLASH).
 
-use crate::stm32::{FlashSlots, Power};
+use crate::stm32::{CONTROL_KEYS, FlashSlots, OPTION_KEYS, Power, take_key};
 use crate::{MICROSECOND, MILLISECOND, Picoseconds};
 
 /// Bits of the access control register.
@@ -38,7 +38,7 @@ pub(super) const SLOTS: usize = 2 * PAGE;
 #[derive(Clone)]
 pub(super) struct Flash {
     registers: [u32; 16],
-    /// Number of keys that have opened the control register and the option bytes.
+    /// Number of keys that have come for the control register and for the option bytes.
     keys: [usize; 2],
     pub slots: FlashSlots,
     /// Option bytes as written to their register and as programmed. The register gives those that were loaded when
@@ -142,16 +142,20 @@ impl Flash {
 
     /// Stores to a register. Handles the keys that unlock the option bytes, which hold the brown-out level.
     pub fn write(&mut self, offset: u32, value: u32, now: Picoseconds) -> Power {
-        match (offset, value, self.keys) {
-            (0x08, 0x4567_0123, _) => self.keys[0] = 1,
-            (0x08, 0xcdef_89ab, [1, _]) => self.registers[5] &= !LOCK,
-            (0x0c, 0x0819_2a3b, _) if self.registers[5] & LOCK == 0 => self.keys[1] = 1,
-            (0x0c, 0x4c5d_6e7f, [_, 1]) => self.registers[5] &= !OPTION_LOCK,
-            (0x20, ..) if self.registers[5] & OPTION_LOCK == 0 => self.written_options = value,
-            (0x00, ..) => self.control_access(value),
-            (0x10, ..) => self.errors &= !value,
-            (0x14, ..) if self.registers[5] & LOCK == 0 => return self.control(value, now),
-            (0x18, ..) if value & 1 << 31 != 0 => self.is_uncorrectable = false,
+        let is_open = self.registers[5] & LOCK == 0;
+        match offset {
+            0x08 if take_key(CONTROL_KEYS, &mut self.keys[0], value) => self.registers[5] &= !LOCK,
+            0x0c => {
+                assert!(is_open, "a key for the option bytes of a locked flash");
+                if take_key(OPTION_KEYS, &mut self.keys[1], value) {
+                    self.registers[5] &= !OPTION_LOCK;
+                }
+            }
+            0x20 if self.registers[5] & OPTION_LOCK == 0 => self.written_options = value,
+            0x00 => self.control_access(value),
+            0x10 => self.errors &= !value,
+            0x14 if is_open => return self.control(value, now),
+            0x18 if value & 1 << 31 != 0 => self.is_uncorrectable = false,
             _ => {}
         }
         Power::On
@@ -176,13 +180,16 @@ impl Flash {
 
     fn control(&mut self, value: u32, now: Picoseconds) -> Power {
         assert!(!self.is_busy(now), "the flash is busy");
-        self.registers[5] = value & !(START | OPTION_START);
+        // Only keys open the option bytes, and a lock of the register locks them, too.
+        let locks = if value & LOCK == 0 {
+            self.registers[5] & OPTION_LOCK
+        } else {
+            OPTION_LOCK
+        };
+        self.registers[5] = value & !(START | OPTION_START) | locks;
         if value & OPTION_START != 0 && self.registers[5] & OPTION_LOCK == 0 {
             self.programmed_options = self.written_options;
             self.options_busy_until = now + OPTION_TIME;
-        }
-        if value & LOCK != 0 {
-            self.keys[0] = 0;
         }
         if value & START == 0 || value & PAGE_ERASE == 0 {
             return Power::On;

@@ -15,7 +15,7 @@ use crate::machine::{Chip, Reset};
 use crate::stm32::{
     Adc, AdcLayout, Crystal, Dac, FlashSlots, Gpio, GpioReset, Individual, Outside, Pin, PinLevel,
     PinMode, Power, Timer, Usart, UsartLayout, Watchdog, WindowWatchdog, WiredChip, carry,
-    check_function, check_spi_pins, expired, store_port,
+    check_function, check_spi_pins, expired, is_within, store_port,
 };
 use crate::unicorn::Processor;
 
@@ -44,14 +44,10 @@ const TO_SEND: Request = Request {
 /// Bit of PWR_CR5 without which the regulator is in its boost mode.
 const BOOST_OFF: u32 = 1 << 8;
 
-/// Highest clock without the regulator's boost mode, Hz.
-const WITHOUT_BOOST_HZ: u64 = 150_000_000;
-
-/// Highest clock per wait state of the flash, in boost mode, Hz.
-const PER_WAIT_STATE_HZ: u64 = 34_000_000;
-
-/// Largest part by which a crystal is too fast: 1 / 5000.
-const CRYSTAL: u64 = 5000;
+/// Highest clock without and with the regulator's boost mode, Hz, and most wait states of the flash, each for an
+/// equal part of it.
+const FASTEST_HZ: [u64; 2] = [150_000_000, 170_000_000];
+const MOST_WAIT_STATES: u64 = 4;
 
 /// After a reset all pins are analogue, except the debugger's.
 fn gpio_reset(port: usize) -> GpioReset {
@@ -177,6 +173,7 @@ impl<O: Outside> Stm32g4<O> {
                 self.note_supply(was_low);
                 let boosts = offset == 0x80 && value & BOOST_OFF == 0;
                 assert!(!boosts || self.rcc.is_divided(), "boost before the divider");
+                self.check_clock();
             }
             0x4001_0400 if offset == 0x14 => self.external_interrupts[5] &= !value,
             0x4001_0400 => self.external_interrupts[((offset / 4) & 15) as usize] = value,
@@ -190,6 +187,7 @@ impl<O: Outside> Stm32g4<O> {
             0x4002_2000 => {
                 let power = self.flash.write(offset, value, now);
                 self.note_power(power);
+                self.check_clock();
             }
             0x5000_0000 => {
                 let (dac, outside) = (&self.dac, &mut self.outside);
@@ -212,13 +210,15 @@ impl<O: Outside> Stm32g4<O> {
     /// Checks regulator and flash for the clock (RM0440, chapters PWR and FLASH).
     fn check_clock(&self) {
         let (system_hz, core_hz) = (self.rcc.system_hz(), self.rcc.core_hz());
+        let fastest_hz = FASTEST_HZ[usize::from(self.power[32] & BOOST_OFF == 0)];
         assert!(
-            system_hz <= WITHOUT_BOOST_HZ || self.power[32] & BOOST_OFF == 0,
-            "{system_hz} Hz without the regulator's boost mode"
+            is_within(system_hz, fastest_hz),
+            "{system_hz} Hz is too fast for the regulator's mode"
         );
-        let wait_states = self.flash.wait_states();
+        let wait_states = self.flash.wait_states().min(MOST_WAIT_STATES);
+        let limit_hz = (wait_states + 1) * fastest_hz / (MOST_WAIT_STATES + 1);
         assert!(
-            core_hz - core_hz / CRYSTAL <= (wait_states + 1) * PER_WAIT_STATE_HZ,
+            is_within(core_hz, limit_hz),
             "{core_hz} Hz with {wait_states} wait states"
         );
     }

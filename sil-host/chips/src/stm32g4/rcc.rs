@@ -104,8 +104,17 @@ impl Rcc {
         self.crystal_works && self.control & HSE_ON != 0 && now >= self.hse_ready_at
     }
 
+    /// The loop needs its source before it is switched on, and as long as it runs.
     fn pll_is_ready(&self, now: Picoseconds) -> bool {
-        self.control & PLL_ON != 0 && now >= self.pll_ready_at
+        self.control & PLL_ON != 0 && now >= self.pll_ready_at && self.pll_has_source(now)
+    }
+
+    fn pll_has_source(&self, now: Picoseconds) -> bool {
+        match self.pll & 3 {
+            2 => true,
+            3 => self.crystal_is_ready(now),
+            _ => false,
+        }
     }
 
     /// Handles a load.
@@ -134,12 +143,20 @@ impl Rcc {
                     self.hse_ready_at = now + CRYSTAL_START;
                 }
                 if value & !self.control & PLL_ON != 0 {
-                    self.pll_ready_at = now + LOCK;
+                    let has_source = self.pll_has_source(now);
+                    self.pll_ready_at = if has_source {
+                        now + LOCK
+                    } else {
+                        Picoseconds::MAX
+                    };
                 }
                 self.control = value;
             }
             0x08 => self.configure(value, now),
-            0x0c => self.pll = value,
+            0x0c => {
+                assert_eq!(self.control & PLL_ON, 0, "the phase-locked loop is on");
+                self.pll = value;
+            }
             0x20 if value & 1 << 8 != 0 => self.nmi = false,
             0x94 if value & 1 << 23 != 0 => self.flags = 0,
             0x28..0x94 => self.registers[(offset / 4) as usize] = value,
@@ -152,11 +169,16 @@ impl Rcc {
         let was_divided = self.is_divided();
         let is_switch = (self.configuration ^ value) & 3 != 0;
         self.configuration = value;
+        let is_ready = match value & 3 {
+            1 => true,
+            2 => self.crystal_is_ready(now),
+            _ => self.pll_is_ready(now),
+        };
+        assert!(is_ready || !is_switch, "the clock is not ready");
         if self.system_hz() <= UNDIVIDED_HZ {
             return;
         }
         if is_switch {
-            assert!(self.pll_is_ready(now), "the clock is not ready");
             assert!(was_divided, "the divider comes first");
             self.switched_at = now;
         }
