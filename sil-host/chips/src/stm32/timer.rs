@@ -8,6 +8,8 @@ pub struct Timer {
     control: u32,
     interrupts: u32,
     flags: u32,
+    /// The prescaler as written, and the one that counts since the last update.
+    next_prescaler: u32,
     prescaler: u32,
     reload: u32,
     /// Count at `since`.
@@ -28,6 +30,7 @@ impl Default for Timer {
             control: 0,
             interrupts: 0,
             flags: 0,
+            next_prescaler: 0,
             prescaler: 0,
             reload: u32::MAX,
             count: 0,
@@ -94,7 +97,7 @@ impl Timer {
                 (u128::from(self.count) + passed / u128::from(self.prescaler + 1)) as u32
             }
             0x24 => self.count as u32,
-            0x28 => self.prescaler,
+            0x28 => self.next_prescaler,
             0x2c => self.reload,
             _ => 0,
         }
@@ -110,11 +113,7 @@ impl Timer {
             }
             0x0c => self.interrupts = value,
             0x10 => self.flags &= value,
-            0x14 if value & 1 != 0 => {
-                self.count = 0;
-                self.since = now;
-                self.flags |= 1;
-            }
+            0x14 if value & 1 != 0 => self.update(now),
             0x24 => {
                 self.count = value.into();
                 self.since = now;
@@ -125,7 +124,7 @@ impl Timer {
                 // Without the channel, its prescaler is at its start.
                 self.edges_seen *= value & 1;
             }
-            0x28 => self.prescaler = value,
+            0x28 => self.next_prescaler = value,
             0x2c => self.reload = value,
             _ => {}
         }
@@ -144,11 +143,17 @@ impl Timer {
     /// Performs due events.
     pub fn advance(&mut self, hz: u64, now: Picoseconds) {
         while self.next_event(hz) <= now {
-            self.since = self.next_event(hz);
-            self.count = 0;
-            self.flags |= 1;
+            self.update(self.next_event(hz));
             self.updates += 1;
         }
+    }
+
+    /// The update event.
+    fn update(&mut self, now: Picoseconds) {
+        self.since = now;
+        self.count = 0;
+        self.prescaler = self.next_prescaler;
+        self.flags |= 1;
     }
 
     /// Returns whether the interrupt line is high.

@@ -11,6 +11,10 @@ const RECEIVED: u32 = 1 << 5;
 const COMPLETE: u32 = 1 << 6;
 const EMPTY: u32 = 1 << 7;
 
+/// Bits of the first control register that switch transmitter and receiver on.
+const TRANSMITTER: u32 = 1 << 3;
+const RECEIVER: u32 = 1 << 2;
+
 /// Rate of the host's end, bit/s.
 const HOST_BAUD: u64 = 921_600;
 
@@ -108,8 +112,10 @@ impl Usart {
         };
     }
 
-    fn is_enabled(&self) -> bool {
-        self.control[0] & self.layout.enable() != 0
+    /// Returns whether the port is on, and its transmitter or receiver.
+    fn is_enabled(&self, part: u32) -> bool {
+        let needed = self.layout.enable() | part;
+        self.control[0] & needed == needed
     }
 
     /// Returns the duration of a byte on the line.
@@ -146,7 +152,9 @@ impl Usart {
             Register::Clear => {
                 self.flags &= !(value & (OVERRUN | FRAMING | IDLE | COMPLETE | 5));
             }
-            Register::ToSend if self.is_enabled() => self.send(value as u8, clock_hz, now),
+            Register::ToSend if self.is_enabled(TRANSMITTER) => {
+                self.send(value as u8, clock_hz, now)
+            }
             Register::Baud => {
                 let apart_hz = clock_hz.abs_diff(u64::from(value) * HOST_BAUD);
                 assert!(apart_hz <= clock_hz / 50, "{clock_hz} Hz / {value}");
@@ -198,7 +206,7 @@ impl Usart {
             && at <= now
         {
             self.incoming.pop_front();
-            if !self.is_enabled() || self.control[0] & 4 == 0 {
+            if !self.is_enabled(RECEIVER) {
                 continue;
             }
             let next = self.incoming.front().map(|(at, _)| *at);
@@ -223,7 +231,7 @@ impl Usart {
 
     /// Returns whether DMA should write a byte.
     pub fn wants_writing(&self) -> bool {
-        self.control[2] & 1 << 7 != 0 && self.flags & EMPTY != 0 && self.is_enabled()
+        self.control[2] & 1 << 7 != 0 && self.flags & EMPTY != 0 && self.is_enabled(TRANSMITTER)
     }
 
     /// Returns a byte to DMA.

@@ -257,10 +257,11 @@ impl<O: Outside> Stm32f4<O> {
             0x4001_2000 if self.rcc.is_on(0x44, 8) => {
                 let (dac, outside) = (&self.dac, &mut self.outside);
                 let sample = |channel: u32| {
-                    let channel = (channel - 4) as usize;
-                    outside.code_at_output(channel, dac.outputs()[channel])
+                    let output = [4, 5].iter().position(|it| *it == channel);
+                    let output = output.expect("a channel at an output of the other converter");
+                    outside.code_at_output(output, dac.outputs()[output])
                 };
-                self.adc.write((offset, value), now, sample);
+                self.adc.write((offset, value), fast, now, sample);
             }
             0x4001_3000 if self.rcc.is_on(0x44, 12) => {
                 self.spis[0].write(offset, value, fast, now);

@@ -4,7 +4,7 @@ use crate::Transfer;
 
 use crate::{Picoseconds, SECOND};
 
-const ENABLED: u32 = 1 << 6;
+const ENABLED_MASTER: u32 = 1 << 6 | 1 << 2;
 const RECEIVED: u32 = 1;
 const EMPTY: u32 = 1 << 1;
 const OVERRUN: u32 = 1 << 6;
@@ -53,7 +53,7 @@ impl Spi {
         match offset {
             0x00 => self.control[0] = value,
             0x04 => self.control[1] = value,
-            0x0c if self.control[0] & ENABLED != 0 => {
+            0x0c if self.control[0] & ENABLED_MASTER == ENABLED_MASTER => {
                 if self.shifting.is_none() {
                     self.begin(value as u16, clock_hz, now);
                 } else {

@@ -192,12 +192,16 @@ impl<O: Outside> Stm32g4<O> {
             0x5000_0000 => {
                 let (dac, outside) = (&self.dac, &mut self.outside);
                 let sample = |channel: u32| {
-                    let channel = usize::from(channel != 17);
-                    outside.code_at_output(channel, dac.outputs()[channel])
+                    let output = [17, 13].iter().position(|it| *it == channel);
+                    let output = output.expect("a channel at an output of the other converter");
+                    outside.code_at_output(output, dac.outputs()[output])
                 };
-                self.adc.write((offset, value), now, sample);
+                self.adc.write((offset, value), hz, now, sample);
             }
-            0x5000_0800 => self.dac.write(offset, value),
+            0x5000_0800 => {
+                self.dac.write(offset, value);
+                self.check_converter(hz);
+            }
             _ => {
                 let port = (address >> 10 & 7) as usize;
                 let gpio = &mut self.ports[port];
@@ -205,6 +209,16 @@ impl<O: Outside> Stm32g4<O> {
                 self.carry(&wired, now);
             }
         }
+    }
+
+    /// Checks that the digital-to-analog converter knows of a fast bus (RM0440, DAC_MCR: HFSEL).
+    fn check_converter(&self, hz: u64) {
+        let is_on = self.dac.control & 0x0001_0001 != 0;
+        let needed = u32::from(hz > 80_000_000) + u32::from(hz > 160_000_000);
+        assert!(
+            !is_on || self.dac.modes >> 14 & 3 >= needed,
+            "HFSEL at {hz} Hz"
+        );
     }
 
     /// Checks regulator and flash for the clock (RM0440, chapters PWR and FLASH).
