@@ -69,20 +69,27 @@ pub fn program() -> &'static Path {
     })
 }
 
-/// Returns the path of the image of the STM32F405, which is flashed and which the emulator runs; it is built if out of
-/// date.
+/// Returns the path of the image of the STM32F405, which is flashed and which the emulator runs.
 ///
 /// # Panics
-/// If it cannot be built.
+/// As [`built_image`].
 pub fn image() -> &'static Path {
     static IMAGE: OnceLock<PathBuf> = OnceLock::new();
     IMAGE.get_or_init(|| built_image("painleve-f405"))
 }
 
 /// Returns the path of an image: in the folder named by `PAINLEVE_IMAGES`, else built if out of date.
-fn built_image(name: &str) -> PathBuf {
+///
+/// # Panics
+/// If the images cannot be built.
+pub fn built_image(name: &str) -> PathBuf {
+    static FOLDER: OnceLock<PathBuf> = OnceLock::new();
+    FOLDER.get_or_init(images).join(name)
+}
+
+fn images() -> PathBuf {
     if let Some(folder) = std::env::var_os("PAINLEVE_IMAGES") {
-        return Path::new(&folder).join(name);
+        return folder.into();
     }
     let cargo = std::env::var("CARGO").unwrap_or_else(|_| "cargo".into());
     let workspace = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
@@ -94,9 +101,7 @@ fn built_image(name: &str) -> PathBuf {
         built.is_ok_and(|status| status.success()),
         "`cargo xtask build-fw` fails: run `cargo xtask setup` first"
     );
-    workspace
-        .join("target/thumbv7em-none-eabihf/firmware")
-        .join(name)
+    workspace.join("target/thumbv7em-none-eabihf/firmware")
 }
 
 /// A working folder for the program, with its bus.

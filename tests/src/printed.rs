@@ -8,8 +8,7 @@ use std::path::{Path, PathBuf};
 /// Largest difference between a printed figure and the measured one, relative to the measured one.
 const TOLERANCE: f64 = 0.03;
 
-const UPDATE: &str = "update it with\n\
-    UPDATE_DOCUMENTATION=1 cargo test -p painleve-tests --tests -- --test-threads 1";
+const UPDATE: &str = "to update it, run this test with UPDATE_DOCUMENTATION=1";
 
 /// Whether the last figure of every line is a limit, which must be printed exactly.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

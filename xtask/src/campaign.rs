@@ -67,6 +67,9 @@ fn success(seed: &str, selection: &[&str]) -> Result<Value, ChoreError> {
         .stderr(Stdio::inherit())
         .output()
         .map_err(|cause| error(&format!("does not start: {cause}")))?;
+    if !output.status.success() {
+        return Err(error(&format!("failed ({})", output.status)));
+    }
     let mut report: Value =
         serde_json::from_slice(&output.stdout).map_err(|_| error("printed no report"))?;
     Ok(report["success"].take())

@@ -3,8 +3,8 @@
 
 use clap::Args;
 
-use crate::command::{ChoreError, cargo};
-use crate::under_test::{PROFILE, run_on_program};
+use crate::command::ChoreError;
+use crate::under_test::run_tests;
 
 /// Options of the fuzzing.
 #[derive(Debug, Args)]
@@ -32,7 +32,7 @@ const TESTS: [&str; 7] = [
 ];
 const FRAMES: &str = "random_frames";
 /// Compares both ends of a bus with a model. Its cases wait for each other, so there are fewer.
-const BUS: [&str; 2] = ["--lib", "both_ends"];
+const BUS: &str = "both_ends";
 const BUS_SHARE: u32 = 20;
 
 /// Runs the part that belongs to `cargo xtask test --all`.
@@ -52,25 +52,16 @@ pub fn nightly() -> Result<(), ChoreError> {
 /// # Errors
 /// If a test fails; its input is printed.
 pub fn run(arguments: &FuzzArguments) -> Result<(), ChoreError> {
-    let test = |selection: &[&str], variables: &[(&str, &str)]| {
-        run_on_program(
-            &cargo(),
-            &[&["test", "--workspace", "--profile", PROFILE], selection].concat(),
-            variables,
-        )
-    };
     let cases = arguments.cases.to_string();
     let ticks = arguments.scenario_ticks.to_string();
     let variables = [
         ("PROPTEST_CASES", cases.as_str()),
         ("PAINLEVE_FUZZ_TICKS", ticks.as_str()),
     ];
-    test(
-        &[&["--lib", "--tests", "--"], &TESTS[..]].concat(),
-        &variables,
-    )?;
+    run_tests(&["--lib", "--tests"], &TESTS, &[], &variables)?;
     let bus_cases = (arguments.cases / BUS_SHARE).max(1).to_string();
-    test(&BUS, &[("PROPTEST_CASES", &bus_cases)])?;
+    run_tests(&["--lib"], &[BUS], &[], &[("PROPTEST_CASES", &bus_cases)])?;
     let frames = arguments.frames.to_string();
-    test(&["--tests", FRAMES], &[("PAINLEVE_FUZZ_TICKS", &frames)])
+    let variables = [("PAINLEVE_FUZZ_TICKS", frames.as_str())];
+    run_tests(&["--tests"], &[FRAMES], &[], &variables)
 }

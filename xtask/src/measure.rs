@@ -36,8 +36,8 @@ pub struct MeasureArguments {
 
 const HEAD: &str = "# Names, labels, commands and `keep` are written by hand, each `result` by `cargo xtask measure`.\n\n";
 
-/// What writes its figures into the pages by itself. Tests compare the first two in every run.
-const BLOCKS: [(&str, &[&str]); 3] = [
+/// What writes its figures into the pages by itself. Tests compare all but the last in every run.
+const BLOCKS: [(&str, &[&str]); 5] = [
     (
         "ticks",
         &[
@@ -58,6 +58,28 @@ const BLOCKS: [(&str, &[&str]); 3] = [
             "--package",
             "painleve-tests",
             "a_tick_has_bounds",
+        ],
+    ),
+    (
+        "worst-ticks",
+        &[
+            "test",
+            "--profile",
+            "verify",
+            "--package",
+            "painleve-flash-image",
+            "the_worst_readings_found",
+        ],
+    ),
+    (
+        "release",
+        &[
+            "test",
+            "--profile",
+            "verify",
+            "--package",
+            "painleve-flash-image",
+            "ticks_begin_within_the_bound",
         ],
     ),
     ("bench", &["xtask", "bench"]),

@@ -230,6 +230,9 @@ fn stack_bytes() -> Result<u64, ChoreError> {
         .stderr(Stdio::inherit())
         .output()
         .map_err(|cause| error(&format!("does not start: {cause}")))?;
+    if !output.status.success() {
+        return Err(error(&format!("failed ({})", output.status)));
+    }
     let reports: Value =
         serde_json::from_slice(&output.stdout).map_err(|_| error("printed no report"))?;
     let reports = reports.as_array().map(Vec::as_slice).unwrap_or_default();

@@ -4,8 +4,8 @@
 
 use clap::Args;
 
-use crate::command::{ChoreError, cargo};
-use crate::under_test::{PROFILE, run_on_program};
+use crate::command::ChoreError;
+use crate::under_test::run_tests;
 
 /// Options of the soak.
 #[derive(Debug, Args)]
@@ -35,21 +35,11 @@ pub fn nightly() -> Result<(), ChoreError> {
 /// If a counter is wrong or the arm moves wrongly.
 pub fn run(arguments: &SoakArguments) -> Result<(), ChoreError> {
     let minutes = |hours: f64| ((60.0 * hours).round() as u32).to_string();
-    run_on_program(
-        &cargo(),
-        &[
-            "test",
-            "--workspace",
-            "--profile",
-            PROFILE,
-            "--test",
-            "it",
-            "soak",
-            "--",
-            "--nocapture",
-            // That of the image is ignored by default.
-            "--include-ignored",
-        ],
+    run_tests(
+        &["--test", "it"],
+        &["soak"],
+        // That of the image is ignored by default.
+        &["--nocapture", "--include-ignored"],
         &[
             ("PAINLEVE_SOAK_MINUTES", &minutes(arguments.hours)),
             ("PAINLEVE_SOAK_QEMU_MINUTES", &minutes(arguments.qemu_hours)),

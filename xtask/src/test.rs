@@ -1,7 +1,7 @@
 //! `cargo xtask test`: the tests, in two tiers.
 //!
-//! The default tier has all tests of up to 20 s each, and a sample of kills. `--all` adds what takes longer or requires
-//! further tools.
+//! The default tier has all tests of up to 20 s each, on one of the two chips, and a sample of kills. `--all` adds what takes
+//! longer or requires further tools.
 //! The last lines name the tier, what it left out, and why.
 
 use std::fs;

@@ -1,9 +1,10 @@
 //! The program under test: where it is, how it is built, and how tests are told of it.
 
 use std::path::PathBuf;
+use std::process::{Command, Stdio};
 
 use crate::build_fw;
-use crate::command::{ChoreError, run_cargo, run_with, workspace};
+use crate::command::{ChoreError, cargo, run_cargo, run_with, workspace};
 
 /// The profile of the program under test and of all tests.
 pub const PROFILE: &str = "verify";
@@ -41,6 +42,37 @@ pub fn under_test() -> [(&'static str, PathBuf); 2] {
         ("PAINLEVE_PROGRAM", program()),
         ("PAINLEVE_IMAGES", build_fw::folder()),
     ]
+}
+
+/// Builds images and program, and runs those tests of the workspace whose names contain one of `names`; `selection` are
+/// options of `cargo test`, `further` those of the tests.
+///
+/// # Errors
+/// As [`run_with`], and if there is no test for a name.
+pub fn run_tests(
+    selection: &[&str],
+    names: &[&str],
+    further: &[&str],
+    environment: &[(&str, &str)],
+) -> Result<(), ChoreError> {
+    let test = ["test", "--workspace", "--profile", PROFILE];
+    let list = [&test[..], &["--quiet"], selection, &["--", "--list"]].concat();
+    let listed = Command::new(cargo())
+        .args(list)
+        .current_dir(workspace())
+        .stderr(Stdio::inherit())
+        .output()
+        .map_err(|cause| ChoreError(format!("cannot list the tests: {cause}")))?;
+    let listed = String::from_utf8_lossy(&listed.stdout);
+    let tests: Vec<_> = listed.lines().filter(|it| it.ends_with(": test")).collect();
+    if let Some(name) = names
+        .iter()
+        .find(|name| !tests.iter().any(|it| it.contains(**name)))
+    {
+        return Err(ChoreError(format!("no test is named '{name}'")));
+    }
+    let run = [&test[..], selection, &["--"], names, further].concat();
+    run_on_program(&cargo(), &run, environment)
 }
 
 /// Builds images and program, and runs a program that tests them.

@@ -7,6 +7,7 @@ use painleve_plant::law_choice::build;
 use painleve_shared::frame::{ActuatorFrame, SensorFrame};
 use painleve_shared::message::{FrameSource, MAXIMUM_LENGTH, Request, Response};
 use painleve_shared::wire::{self, Inbox};
+use painleve_tests::built_image;
 
 use crate::bare::BareBench;
 use painleve_chips::machine::{Machine, MachineSnapshot, Reset};
@@ -203,15 +204,6 @@ pub fn library() -> PathBuf {
         .unwrap_or_else(|| panic!("Unicorn is not installed: run `cargo xtask setup`"))
 }
 
-/// Returns the path of an image, in the folder `PAINLEVE_IMAGES` or where `cargo xtask build-fw` writes it.
-pub fn image(name: &str) -> PathBuf {
-    let folder = std::env::var_os("PAINLEVE_IMAGES").map_or_else(
-        || workspace().join("target/thumbv7em-none-eabihf/firmware"),
-        PathBuf::from,
-    );
-    folder.join(name)
-}
-
 fn workspace() -> PathBuf {
     PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../.."))
 }
@@ -230,7 +222,7 @@ impl<C: BoardChip> EmulatedBoard<C> {
         chip.drive_pin(RESET, Some(false));
         chip.drive_pin(STAGES_READY, Some(true));
         Self {
-            machine: Machine::new(&library(), &image(C::IMAGE), chip),
+            machine: Machine::new(&library(), &built_image(C::IMAGE), chip),
             inbox: Inbox::new(),
             heard: 0,
             line_free: 0,

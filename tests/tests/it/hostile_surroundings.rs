@@ -402,12 +402,29 @@ fn the_watchdog_removes_the_torque_of_a_plant_without_commands() {
     let report = bench.report(&[
         "run",
         "--json",
-        "--no-record",
+        "--record",
+        "run.mcap",
         "--no-plot",
         "--set",
         "converters.link.frame_loss=0.7",
         "--set",
         "converters.torque.watchdog_ticks=10",
     ]);
-    assert!(report["drive_watchdog_s"].is_number(), "{report}");
+    let off_s = report["drive_watchdog_s"].as_f64().unwrap();
+    let export = bench.run(&["export", "run.mcap", "--csv", "run.csv"]);
+    assert!(export.status.success(), "{}", errors(&export));
+    let table = std::fs::read_to_string(bench.path("run.csv")).unwrap();
+    let mut lines = table
+        .lines()
+        .map(|line| line.split(',').collect::<Vec<_>>());
+    let names = lines.next().unwrap();
+    let column = |name| names.iter().position(|it| *it == name).unwrap();
+    let [time, u1, u2] = ["time_s", "plant.u1_nm", "plant.u2_nm"].map(column);
+    let after: Vec<_> = lines
+        .filter(|line| line[time].parse::<f64>().unwrap() > off_s)
+        .collect();
+    assert!(after.len() > 100, "{}", after.len());
+    for line in after {
+        assert_eq!((line[u1], line[u2]), ("0.0", "0.0"), "{line:?}");
+    }
 }

@@ -266,7 +266,7 @@ fn a_realtime_run_takes_as_long_as_its_simulated_time() {
     let report = bench.report(&arguments);
     assert_eq!(report["pacing"], "realtime");
     assert_eq!(report["ticks"], 500);
-    assert!(number(&report, "wall_s") >= 0.499);
+    assert!((0.499..10.0).contains(&number(&report, "wall_s")));
     assert!(report["wake_up_us"]["max"].is_number());
 }
 

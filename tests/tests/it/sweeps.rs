@@ -171,7 +171,7 @@ fn finished_shards_are_skipped_and_broken_ones_computed_again() {
         assert!(errors(&output).contains(part), "{output:?}");
         assert!(!bench.path("out/sweep/merged.csv").exists());
     };
-    refused("shards 3 of 5 are missing");
+    refused("missing of 5 shards: 3");
     text(&run("3/5"));
     assert_eq!(missing(), "");
     write(

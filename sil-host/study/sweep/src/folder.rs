@@ -178,7 +178,7 @@ impl SweepStatus {
     /// Returns a sentence for everything that is missing, duplicated or broken.
     pub fn defects(&self) -> Vec<String> {
         let missing = (!self.missing.is_empty())
-            .then(|| format!("shards {} of {} are missing", self.missing, self.shards));
+            .then(|| format!("missing of {} shards: {}", self.shards, self.missing));
         let duplicates = self.duplicates.iter().map(|Duplicate { shard, files }| {
             let names: Vec<_> = files
                 .iter()
@@ -280,7 +280,7 @@ mod tests {
         assert_eq!(missing(folder.path(), &manifest).unwrap(), [1, 4]);
         let message = || merge(folder.path(), &manifest).unwrap_err().to_string();
         assert!(
-            message().contains("shards 1,4 of 5 are missing"),
+            message().contains("missing of 5 shards: 1,4"),
             "{}",
             message()
         );

@@ -13,7 +13,7 @@ use painleve_bound::report::{
 };
 use painleve_bound::trace::{Executed, Tracer, rounds, without_waits};
 use painleve_flash_image::bench::{Bench, BoardBench, encoded, scenario, with_one_sensor};
-use painleve_flash_image::board::{self, BoardChip, EmulatedBoard, F405, FlashedBoard, G474};
+use painleve_flash_image::board::{BoardChip, EmulatedBoard, F405, FlashedBoard, G474};
 use painleve_plant::scenario::{Scenario, built_in};
 use painleve_plant::simulation::Simulation;
 use painleve_plant::statistics::Statistics;
@@ -177,7 +177,7 @@ impl<'a> BoundCheck<'a> {
 
 /// Returns the image of a board.
 pub fn flashed<C: BoardChip>() -> Image {
-    let path = board::image(C::IMAGE);
+    let path = painleve_tests::built_image(C::IMAGE);
     Image::of(&path, &std::fs::read(&path).unwrap()).unwrap()
 }
 
