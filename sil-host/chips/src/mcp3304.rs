@@ -21,8 +21,6 @@ pub struct Mcp3304 {
     /// Bit errors on the wires, in both directions.
     pub bit_errors: BitErrors,
     violations: Vec<&'static str>,
-    /// The last sixteen results.
-    pub conversions: Vec<i32>,
     /// Bits of the command after the start bit.
     command: u8,
     /// Number of bits since and including the start bit.
@@ -41,7 +39,7 @@ impl Mcp3304 {
     }
 
     /// Returns the 13-bit two's complement result of the selected channel or pair.
-    fn convert(&mut self) -> u16 {
+    fn convert(&self) -> u16 {
         let channel = usize::from(self.command & 7);
         let value = if self.command & 8 != 0 {
             // Single-ended inputs cannot go below ground.
@@ -49,10 +47,6 @@ impl Mcp3304 {
         } else {
             (self.channels[channel] - self.channels[channel ^ 1]).clamp(-4096, 4095)
         };
-        if self.conversions.len() == 16 {
-            self.conversions.remove(0);
-        }
-        self.conversions.push(value);
         value as u16 & 0x1fff
     }
 }

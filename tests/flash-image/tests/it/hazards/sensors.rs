@@ -2,7 +2,6 @@
 
 use painleve_chips::BridgeFailure;
 use painleve_chips::MILLISECOND;
-use painleve_drivers::force_cell::LIVE_ZERO;
 use painleve_flash_image::bench::{Bench, encoded, scenario, with_one_sensor};
 use painleve_flash_image::board::{BoardChip, EmulatedBoard, STAGES_READY};
 use painleve_plant::plant::Plant as _;
@@ -25,8 +24,6 @@ crate::on_each_board! {
     a_winding_that_becomes_too_hot_takes_the_torque_off,
     arming_on_implausible_readings_is_refused_with_a_fault,
     parts_mounted_backwards_drive_the_same_arm,
-    the_image_respects_the_limits_of_the_data_sheets,
-    forces_of_either_sign_are_converted,
     one_disturbed_transfer_is_no_fault,
     nothing_arms_on_dead_lines_or_on_a_switch_that_was_closed_before,
 }
@@ -199,24 +196,6 @@ fn parts_mounted_backwards_drive_the_same_arm<C: BoardChip>() {
     let straight = tip_m(&scenario, Mounting::default());
     scenario.converters.mounting = mounted;
     assert!((tip_m(&scenario, mounted) - straight).abs() < 1e-3);
-}
-
-fn the_image_respects_the_limits_of_the_data_sheets<C: BoardChip>() {
-    let mut bench = driven::<C>();
-    for _ in 0..200 {
-        bench.tick();
-    }
-    assert_eq!(bench.board.wiring().violations(), [""; 0]);
-}
-
-fn forces_of_either_sign_are_converted<C: BoardChip>() {
-    let mut bench = driven::<C>();
-    let conversions = &bench.board.wiring().force.conversions;
-    assert!(
-        conversions.iter().any(|it| *it < LIVE_ZERO)
-            && conversions.iter().any(|it| *it > LIVE_ZERO),
-        "{conversions:?}"
-    );
 }
 
 fn one_disturbed_transfer_is_no_fault<C: BoardChip>() {
