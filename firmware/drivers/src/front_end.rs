@@ -306,10 +306,13 @@ impl FrontEnd {
     /// Permits arming once the button has been pressed for long enough: a deliberate act of an operator who has
     /// opened ENABLE. A press permits once: a line that is stuck high does not permit again.
     fn note_button(&mut self, is_pressed: bool, is_enabled: bool) {
-        self.pressed_ticks = match (is_pressed, is_enabled) {
-            (false, _) => 0,
-            (true, true) => u32::MAX,
-            (true, false) => self.pressed_ticks.saturating_add(1),
+        if !is_pressed {
+            self.pressed_ticks = 0;
+            return;
+        }
+        self.pressed_ticks = match is_enabled {
+            true => u32::MAX,
+            false => self.pressed_ticks.saturating_add(1),
         };
         let settings = self.settings.as_ref();
         let limit = settings.and_then(|it| it.button_ticks);
