@@ -2,8 +2,6 @@
 
 use std::str::FromStr;
 
-use crate::options::once;
-
 /// Largest number of values in a grid.
 const MOST_VALUES: f64 = 1e6;
 
@@ -167,6 +165,17 @@ fn rounded(value: f64, decimals: usize) -> f64 {
     format!("{value:.decimals$}").parse().unwrap_or(value) + 0.0
 }
 
+/// Returns the values of a list on the command line in their order, each once.
+pub fn once<T: Clone + PartialEq>(values: &[T]) -> Vec<T> {
+    let mut once: Vec<T> = Vec::new();
+    for value in values {
+        if !once.contains(value) {
+            once.push(value.clone());
+        }
+    }
+    once
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -238,5 +247,10 @@ mod tests {
         fn no_text_panics(text in "[-0-9.:,ea inf]{0,20}") {
             let _ = text.parse::<Grid>();
         }
+    }
+
+    #[test]
+    fn what_is_given_twice_is_there_once() {
+        assert_eq!(once(&[3, 1, 3]), [3, 1]);
     }
 }

@@ -251,17 +251,6 @@ impl From<PostureOption> for Posture {
     }
 }
 
-/// Returns the values of a list on the command line in their order, each once.
-pub fn once<T: Clone + PartialEq>(values: &[T]) -> Vec<T> {
-    let mut once: Vec<T> = Vec::new();
-    for value in values {
-        if !once.contains(value) {
-            once.push(value.clone());
-        }
-    }
-    once
-}
-
 /// A length on the command line.
 ///
 /// # Errors
@@ -339,11 +328,6 @@ mod tests {
         }
         let other = load("belt={profile={kind='constant',speed_m_s=-0.7}}").unwrap();
         assert_eq!(other.belt.profile.speed_m_s(0.0), -0.7);
-    }
-
-    #[test]
-    fn what_is_given_twice_is_there_once() {
-        assert_eq!(once(&[3, 1, 3]), [3, 1]);
     }
 
     #[test]

@@ -5,9 +5,10 @@ use painleve_study_core::StudyError;
 use painleve_study_core::case::Reference;
 use painleve_study_core::catalogue::{InShards, PageSection, StudyOptions, in_shards};
 use painleve_study_core::figures::page_maker::PageMaker;
+use painleve_study_core::grid::once;
 use painleve_study_core::options::{
     BeltSpeedGrid, ControllerOptions, ConverterOptions, FrictionGrid, InitialOptions, Overrides,
-    RecordingOptions, once,
+    RecordingOptions,
 };
 
 use super::{ClosedLoopBifurcation, ClosedLoopDiagram, Row, page};

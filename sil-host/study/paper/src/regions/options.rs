@@ -4,7 +4,8 @@ use clap::{Args, ValueEnum};
 use painleve_shared::Slip;
 use painleve_study_core::catalogue::{PageSection, StudyOptions};
 use painleve_study_core::figures::page_maker::PageMaker;
-use painleve_study_core::options::{BaseOptions, once};
+use painleve_study_core::grid::once;
+use painleve_study_core::options::BaseOptions;
 use painleve_study_core::{Grid, StudyError};
 
 use super::{Map, Regions, RegionsStudy, Theta2, page};

@@ -5,9 +5,9 @@ use painleve_study_core::StudyError;
 use painleve_study_core::case::Reference;
 use painleve_study_core::catalogue::{InShards, PageSection, StudyOptions, in_shards};
 use painleve_study_core::figures::page_maker::PageMaker;
+use painleve_study_core::grid::once;
 use painleve_study_core::options::{
-    ControllerOptions, ConverterOptions, FrictionGrid, Overrides, PostureOption, metres, once,
-    seconds,
+    ControllerOptions, ConverterOptions, FrictionGrid, Overrides, PostureOption, metres, seconds,
 };
 
 use super::{Criterion, Row, SlidingRange, SlidingRanges, page};

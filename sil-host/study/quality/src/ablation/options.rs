@@ -3,7 +3,8 @@
 use clap::{Args, ValueEnum};
 use painleve_study_core::StudyError;
 use painleve_study_core::catalogue::StudyOptions;
-use painleve_study_core::options::{RandomRuns, once};
+use painleve_study_core::grid::once;
+use painleve_study_core::options::RandomRuns;
 
 use super::{Ablation, AblationStudy, Condition};
 use crate::robustness::{Part, Row};

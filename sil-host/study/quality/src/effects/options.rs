@@ -4,7 +4,8 @@ use clap::Args;
 use clap::builder::PossibleValuesParser;
 use painleve_study_core::StudyError;
 use painleve_study_core::catalogue::{InShards, StudyOptions, in_shards};
-use painleve_study_core::options::{ControllerOptions, RandomRuns, level, once};
+use painleve_study_core::grid::once;
+use painleve_study_core::options::{ControllerOptions, RandomRuns, level};
 
 use super::{Contact, EFFECTS, EffectsOutcome, EffectsStudy, Row, find};
 use crate::robustness::Criterion;

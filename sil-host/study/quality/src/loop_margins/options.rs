@@ -4,7 +4,8 @@ use clap::Args;
 
 use super::{LoopMargins, LoopOutcome, Row};
 use painleve_study_core::catalogue::{InShards, StudyOptions, in_shards};
-use painleve_study_core::options::{ControllerOptions, Overrides, PostureOption, once};
+use painleve_study_core::grid::once;
+use painleve_study_core::options::{ControllerOptions, Overrides, PostureOption};
 use painleve_study_core::{Grid, StudyError};
 
 /// The sampled loop in the frequency domain: Bode plots, margins and steps along the belt.

@@ -3,7 +3,8 @@
 use clap::Args;
 use painleve_study_core::StudyError;
 use painleve_study_core::catalogue::{InShards, StudyOptions, in_shards};
-use painleve_study_core::options::{RandomRuns, once};
+use painleve_study_core::grid::once;
+use painleve_study_core::options::RandomRuns;
 
 use super::{Arms, Criterion, Part, Robustness, RobustnessOutcome, Row};
 
