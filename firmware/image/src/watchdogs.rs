@@ -116,6 +116,8 @@ pub trait IndependentWatchdog {
     #[inline(never)]
     fn start(&self, limit_s: f32, meanwhile: impl Fn()) {
         self.write_key(START);
+        // One that runs is not fed by its start.
+        self.feed();
         self.write_key(OPEN);
         self.set(IndependentLimit::new(limit_s, Self::FASTEST_HZ));
         let _ = (0..PATIENCE).any(|_| {
