@@ -1,12 +1,11 @@
 //! The campaigns of `cargo xtask test --all`: random arms and belts from a fresh seed, which is printed.
 
 use std::hash::{BuildHasher, Hasher, RandomState};
-use std::process::{Command, Stdio};
 
 use serde_json::Value;
 
-use crate::command::{ChoreError, say, workspace};
-use crate::under_test::program;
+use crate::command::{ChoreError, say};
+use crate::under_test::printed_json;
 
 /// A contact: its name, the arguments that select it, and the least lower limit of the success rate (Wilson, 95 %). With
 /// the rates that the documentation prints, chance goes below it in fewer than one of 1,000 campaigns.
@@ -59,18 +58,6 @@ fn success(seed: &str, selection: &[&str]) -> Result<Value, ChoreError> {
         "--seed",
         seed,
     ];
-    let error = |what: &str| ChoreError(format!("`painleve {}` {what}", campaign.join(" ")));
-    let output = Command::new(program())
-        .args(campaign)
-        .args(selection)
-        .current_dir(workspace())
-        .stderr(Stdio::inherit())
-        .output()
-        .map_err(|cause| error(&format!("does not start: {cause}")))?;
-    if !output.status.success() {
-        return Err(error(&format!("failed ({})", output.status)));
-    }
-    let mut report: Value =
-        serde_json::from_slice(&output.stdout).map_err(|_| error("printed no report"))?;
+    let mut report = printed_json(&[&campaign[..], selection].concat())?;
     Ok(report["success"].take())
 }

@@ -58,10 +58,16 @@ pub fn run(arguments: &FuzzArguments) -> Result<(), ChoreError> {
         ("PROPTEST_CASES", cases.as_str()),
         ("PAINLEVE_FUZZ_TICKS", ticks.as_str()),
     ];
-    run_tests(&["--lib", "--tests"], &TESTS, &[], &variables)?;
+    run_tests(
+        &["--workspace", "--lib", "--tests"],
+        &TESTS,
+        &[],
+        &variables,
+    )?;
     let bus_cases = (arguments.cases / BUS_SHARE).max(1).to_string();
-    run_tests(&["--lib"], &[BUS], &[], &[("PROPTEST_CASES", &bus_cases)])?;
+    let variables = [("PROPTEST_CASES", bus_cases.as_str())];
+    run_tests(&["--workspace", "--lib"], &[BUS], &[], &variables)?;
     let frames = arguments.frames.to_string();
     let variables = [("PAINLEVE_FUZZ_TICKS", frames.as_str())];
-    run_tests(&["--tests"], &[FRAMES], &[], &variables)
+    run_tests(&["--workspace", "--tests"], &[FRAMES], &[], &variables)
 }

@@ -17,7 +17,7 @@ use serde_json::Value;
 use toml::Table;
 
 use crate::command::{ChoreError, cargo, run_with, say, workspace};
-use crate::under_test::{build_program, program};
+use crate::under_test::{build_program, program, run_tests};
 
 #[derive(Debug, Args)]
 pub struct MeasureArguments {
@@ -36,54 +36,24 @@ pub struct MeasureArguments {
 
 const HEAD: &str = "# Names, labels, commands and `keep` are written by hand, each `result` by `cargo xtask measure`.\n\n";
 
-/// What writes its figures into the pages by itself. Tests compare all but the last in every run.
-const BLOCKS: [(&str, &[&str]); 5] = [
-    (
-        "ticks",
-        &[
-            "test",
-            "--profile",
-            "verify",
-            "--package",
-            "painleve-tests",
-            "the_image_",
-        ],
-    ),
-    (
-        "bound",
-        &[
-            "test",
-            "--profile",
-            "verify",
-            "--package",
-            "painleve-tests",
-            "a_tick_has_bounds",
-        ],
-    ),
+/// Tests that write figures into the pages: the name here, the package and the test. They compare them in every run.
+const BLOCKS: [(&str, &str, &str); 4] = [
+    ("ticks", "painleve-tests", "the_image_"),
+    ("bound", "painleve-tests", "a_tick_has_bounds"),
     (
         "worst-ticks",
-        &[
-            "test",
-            "--profile",
-            "verify",
-            "--package",
-            "painleve-flash-image",
-            "the_worst_readings_found",
-        ],
+        "painleve-flash-image",
+        "the_worst_readings_found",
     ),
     (
         "release",
-        &[
-            "test",
-            "--profile",
-            "verify",
-            "--package",
-            "painleve-flash-image",
-            "ticks_begin_within_the_bound",
-        ],
+        "painleve-flash-image",
+        "ticks_begin_within_the_bound",
     ),
-    ("bench", &["xtask", "bench"]),
 ];
+
+/// The chore that measures times beside those of others.
+const BENCH: &str = "bench";
 
 /// The commands that draw the pages' figures of results, named `figures`.
 const FIGURES: [&str; 4] = [
@@ -177,14 +147,14 @@ pub fn run(arguments: &MeasureArguments) -> Result<(), ChoreError> {
             run_with(&program().to_string_lossy(), &arguments, &[])?;
         }
     }
-    let blocks = BLOCKS
-        .iter()
-        .filter(|(name, _)| is_named(name))
-        .map(|(_, command)| *command);
-    for command in blocks.chain([&update[..]]) {
-        run_with(&cargo(), command, &[("UPDATE_DOCUMENTATION", "1")])?;
+    let environment = [("UPDATE_DOCUMENTATION", "1")];
+    for (_, package, test) in BLOCKS.iter().filter(|(name, ..)| is_named(name)) {
+        run_tests(&["--package", package], &[test], &[], &environment)?;
     }
-    Ok(())
+    if is_named(BENCH) {
+        run_with(&cargo(), &["xtask", BENCH], &environment)?;
+    }
+    run_with(&cargo(), &update, &environment)
 }
 
 fn read_files() -> Result<Vec<Measured>, ChoreError> {
@@ -213,8 +183,8 @@ fn read_files() -> Result<Vec<Measured>, ChoreError> {
 }
 
 fn check_names(names: &[String], files: &[Measured]) -> Result<(), ChoreError> {
-    let mut known: Vec<String> = BLOCKS.iter().map(|(name, _)| (*name).into()).collect();
-    known.push("figures".into());
+    let mut known: Vec<String> = BLOCKS.iter().map(|(name, ..)| (*name).into()).collect();
+    known.extend([BENCH.into(), "figures".into()]);
     for file in files {
         for place in 0..file.entries()?.len() {
             known.push(format!(

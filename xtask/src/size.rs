@@ -3,7 +3,6 @@
 use object::{Object, ObjectSection, ObjectSymbol, SectionFlags, SectionKind, elf};
 
 use std::path::Path;
-use std::process::{Command, Stdio};
 use std::{fs, io};
 
 use serde_json::Value;
@@ -11,7 +10,7 @@ use serde_json::Value;
 use crate::boards;
 use crate::build_fw;
 use crate::command::{ChoreError, say, workspace};
-use crate::under_test::{build_program, program};
+use crate::under_test::{build_program, printed_json};
 
 /// All limits; the end-to-end tests check those of the ticks and of the stack as well.
 const BUDGET: &str = include_str!("../../tests/budget.json");
@@ -223,24 +222,13 @@ pub fn thousands(number: u64) -> String {
 /// the configuration is decoded and in the first ticks.
 fn stack_bytes() -> Result<u64, ChoreError> {
     let arguments = ["timing", "--json", "--set", "run.duration_s=0.1"];
-    let error = |what: &str| ChoreError(format!("`painleve {}` {what}", arguments.join(" ")));
-    let output = Command::new(program())
-        .args(arguments)
-        .current_dir(workspace())
-        .stderr(Stdio::inherit())
-        .output()
-        .map_err(|cause| error(&format!("does not start: {cause}")))?;
-    if !output.status.success() {
-        return Err(error(&format!("failed ({})", output.status)));
-    }
-    let reports: Value =
-        serde_json::from_slice(&output.stdout).map_err(|_| error("printed no report"))?;
+    let reports = printed_json(&arguments)?;
     let reports = reports.as_array().map(Vec::as_slice).unwrap_or_default();
     let stacks = reports.iter().map(|report| report["stack_bytes"].as_u64());
     stacks
         .collect::<Option<Vec<_>>>()
         .and_then(|stacks| stacks.into_iter().max())
-        .ok_or_else(|| error("does not report the stack"))
+        .ok_or_else(|| ChoreError("`painleve timing` does not report the stack".into()))
 }
 
 /// Returns the programmed bytes: code, constants, and initial values.

@@ -36,7 +36,7 @@ pub fn nightly() -> Result<(), ChoreError> {
 pub fn run(arguments: &SoakArguments) -> Result<(), ChoreError> {
     let minutes = |hours: f64| ((60.0 * hours).round() as u32).to_string();
     run_tests(
-        &["--test", "it"],
+        &["--workspace", "--test", "it"],
         &["soak"],
         // That of the image is ignored by default.
         &["--nocapture", "--include-ignored"],

@@ -3,6 +3,8 @@
 use std::path::PathBuf;
 use std::process::{Command, Stdio};
 
+use serde_json::Value;
+
 use crate::build_fw;
 use crate::command::{ChoreError, cargo, run_cargo, run_with, workspace};
 
@@ -44,8 +46,8 @@ pub fn under_test() -> [(&'static str, PathBuf); 2] {
     ]
 }
 
-/// Builds images and program, and runs those tests of the workspace whose names contain one of `names`; `selection` are
-/// options of `cargo test`, `further` those of the tests.
+/// Builds images and program, and runs those tests whose names contain one of `names`; `selection` are options of
+/// `cargo test`, `further` those of the tests.
 ///
 /// # Errors
 /// As [`run_with`], and if there is no test for a name.
@@ -55,7 +57,7 @@ pub fn run_tests(
     further: &[&str],
     environment: &[(&str, &str)],
 ) -> Result<(), ChoreError> {
-    let test = ["test", "--workspace", "--profile", PROFILE];
+    let test = ["test", "--profile", PROFILE];
     let list = [&test[..], &["--quiet"], selection, &["--", "--list"]].concat();
     let listed = Command::new(cargo())
         .args(list)
@@ -73,6 +75,24 @@ pub fn run_tests(
     }
     let run = [&test[..], selection, &["--"], names, further].concat();
     run_on_program(&cargo(), &run, environment)
+}
+
+/// Returns the JSON that a command of the program under test prints.
+///
+/// # Errors
+/// If it does not start, fails or prints something else.
+pub fn printed_json(arguments: &[&str]) -> Result<Value, ChoreError> {
+    let error = |what: &str| ChoreError(format!("`painleve {}` {what}", arguments.join(" ")));
+    let output = Command::new(program())
+        .args(arguments)
+        .current_dir(workspace())
+        .stderr(Stdio::inherit())
+        .output()
+        .map_err(|cause| error(&format!("does not start: {cause}")))?;
+    if !output.status.success() {
+        return Err(error(&format!("failed ({})", output.status)));
+    }
+    serde_json::from_slice(&output.stdout).map_err(|_| error("printed no report"))
 }
 
 /// Builds images and program, and runs a program that tests them.

@@ -80,8 +80,7 @@ extern "C" fn resume<F: FnOnce() -> Infallible>(held: *mut ()) -> ! {
 pub fn high_water_bytes() -> u32 {
     let mut word = addr_of_mut!(_stack_end);
     let top = addr_of_mut!(_stack_start);
-    // SAFETY: reads the words of the stack; a value
-    // that changes during the read does no harm.
+    // SAFETY: reads the words of the stack; a value that changes during the read does no harm.
     while word < top && unsafe { word.read_volatile() } == PAINT {
         word = word.wrapping_add(1);
     }

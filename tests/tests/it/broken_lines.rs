@@ -436,7 +436,7 @@ fn bytes_that_are_no_frames_are_told_from_silence() {
         let (output, _) = output(board.start(&bench, arguments));
         let text = errors(&output);
         assert_eq!(output.status.code(), Some(3), "{arguments:?}: {text}");
-        assert!(text.contains("the board has not answered for "), "{text}");
+        assert!(text.contains("the board has not answered for 1."), "{text}");
         let is_told = text.contains(" bytes, none of them a frame: wrong baud rate");
         assert_eq!(is_told, break_ == Break::Garbage, "{arguments:?}: {text}");
     };
