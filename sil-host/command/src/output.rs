@@ -1,6 +1,6 @@
 //! The output files of a run, written while it runs.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use clap::builder::TypedValueParser as _;
@@ -188,6 +188,12 @@ impl Output {
         }
         Ok(self.paths)
     }
+}
+
+/// Returns where what has been measured of an arm is written by default: that of a rehearsal apart from that of a real arm.
+pub fn default_output(rehearses: bool, name: &str) -> PathBuf {
+    let name = if rehearses { "rehearsed" } else { name };
+    format!("out/{name}.toml").into()
 }
 
 /// Tells, after a failure, which results of an earlier run are still there.

@@ -250,7 +250,8 @@ impl Commissioned {
             corrected.controller.friction.first_guess = friction.min(2.0) as f32;
         }
         // Whatever was known is that of the arm as it was.
-        if is_other || identification::is_new(scenario) {
+        let was_known = !identification::is_new(scenario) && !scenario.knowledge.is_rehearsed();
+        if is_other || !was_known {
             identification::suppose_drawn(&mut corrected);
         }
         // The file's start must lie on the belt at its new height.

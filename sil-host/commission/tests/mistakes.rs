@@ -341,6 +341,11 @@ fn play_that_the_operator_has_told_is_kept() {
         },
         ..corrected
     };
+    // So is what a rehearsal has measured, even of an arm that is mounted alike.
+    let mut rehearsed = drawn.clone();
+    rehearsed.knowledge.source = Knowledge::rehearsal(1);
+    let real = commissioned.applied_to(&rehearsed).unwrap();
+    assert!(!real.knowledge.is_rehearsed());
     let again = commissioned.applied_to(&moved).unwrap();
     assert_eq!(again.knowledge.told_m, 0.05);
     assert_eq!(again.controller.estimator.tip_deviation_m, deviation_m);

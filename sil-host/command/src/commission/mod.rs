@@ -13,8 +13,7 @@ use painleve_commission::{
 };
 use painleve_files::atomic_file;
 use painleve_plant::decimal::as_written;
-use painleve_plant::scenario::knowledge::REHEARSAL;
-use painleve_plant::scenario::{Scenario, ScenarioError, built_in};
+use painleve_plant::scenario::{Knowledge, Scenario, ScenarioError, built_in};
 use painleve_shared::mounting::SensorParts;
 use painleve_shared::range::OutOfRange;
 use serde_json::json;
@@ -22,7 +21,7 @@ use serde_json::json;
 use self::board_rig::BoardRig;
 pub use self::board_rig::BoardRigError;
 use self::rehearsal::Rehearsal;
-use super::output::warn_of_earlier;
+use super::output::{default_output, warn_of_earlier};
 use super::output_error::{InputError, output};
 use super::{CommandError, distinct_files, say};
 
@@ -106,14 +105,9 @@ pub fn run(arguments: &CommissionArguments) -> Result<(), CommandError> {
     };
     let torque_limit_nm = torque_limit_nm(arguments, &scenario).map_err(range)?;
     let expected = Expected::new(&scenario, torque_limit_nm).map_err(range)?;
-    let output_path = arguments.output.clone().unwrap_or_else(|| {
-        let name = if arguments.rehearse {
-            "rehearsed"
-        } else {
-            "commissioned"
-        };
-        format!("out/{name}.toml").into()
-    });
+    let output_path = arguments.output.clone();
+    let output_path =
+        output_path.unwrap_or_else(|| default_output(arguments.rehearse, "commissioned"));
     distinct_files::check(&[("--output", &output_path)])?;
     let commissioned = match &arguments.port {
         None => rehearse(arguments, &scenario, &expected),
@@ -136,8 +130,7 @@ pub fn run(arguments: &CommissionArguments) -> Result<(), CommandError> {
         (corrected, commissioned.deviations)
     };
     if arguments.rehearse {
-        let seed = arguments.seed.unwrap_or(1);
-        corrected.knowledge.source = format!("{REHEARSAL} with seed {seed}");
+        corrected.knowledge.source = Knowledge::rehearsal(arguments.seed.unwrap_or(1));
     }
     let text = corrected.to_commented_toml();
     atomic_file::write(&output_path, text.as_bytes()).map_err(output)?;

@@ -13,7 +13,6 @@ use painleve_board::BoardError;
 use painleve_board::arm::{ArmEvent, ConnectedArm, Measured};
 use painleve_commission::{identification, set_down};
 use painleve_files::input_file;
-use painleve_plant::scenario::knowledge::REHEARSAL;
 use painleve_plant::scenario::{Scenario, ScenarioError, built_in};
 use painleve_process::interrupt::Interrupt;
 use painleve_process::terminal::warn;
@@ -322,7 +321,7 @@ pub(crate) fn check_rate(scenario: &Scenario) -> Result<(), ScenarioError> {
 /// # Errors
 /// [`InputError::Rehearsed`].
 pub(crate) fn check_commissioned(scenario: &Scenario) -> Result<(), InputError> {
-    if scenario.knowledge.source.starts_with(REHEARSAL) {
+    if scenario.knowledge.is_rehearsed() {
         return Err(InputError::Rehearsed(scenario.knowledge.source.clone()));
     }
     if identification::is_new(scenario) {

@@ -19,8 +19,7 @@ use painleve_files::atomic_file::{commit_all, prepare};
 use painleve_identify::parameters::Drawn;
 use painleve_identify::{Parameters, Slide};
 use painleve_plant::decimal::as_written;
-use painleve_plant::scenario::knowledge::REHEARSAL;
-use painleve_plant::scenario::{Scenario, ScenarioError, built_in};
+use painleve_plant::scenario::{Knowledge, Scenario, ScenarioError, built_in};
 use painleve_process::terminal::{self, warn};
 use painleve_shared::Posture;
 use painleve_study_core::options::number;
@@ -29,7 +28,7 @@ use serde_json::json;
 use self::board_slides::BoardSlides;
 use self::recorded::Recorded;
 use super::drive::{check_commissioned, check_rate};
-use super::output::warn_of_earlier;
+use super::output::{default_output, warn_of_earlier};
 use super::output_error::{InputError, output};
 use super::{CommandError, distinct_files, say};
 
@@ -113,20 +112,13 @@ pub fn run(arguments: &IdentifyArguments) -> Result<(), CommandError> {
         .map(|it| it.read(&scenario))
         .collect();
     let slides = recorded?;
-    let stem = match arguments.rehearse {
-        true => "out/rehearsed",
-        false => "out/identified",
+    let default = default_output(arguments.rehearse, "identified");
+    let given = |path: &Option<PathBuf>, extension: &str| {
+        let path = path.clone();
+        path.unwrap_or_else(|| default.with_extension(extension))
     };
-    let (output_path, html_path) = (
-        arguments
-            .output
-            .clone()
-            .unwrap_or_else(|| format!("{stem}.toml").into()),
-        arguments
-            .html
-            .clone()
-            .unwrap_or_else(|| format!("{stem}.html").into()),
-    );
+    let output_path = given(&arguments.output, "toml");
+    let html_path = given(&arguments.html, "html");
     distinct_files::check(&[("--output", &output_path), ("--html", &html_path)])?;
     let mut drawn = Drawn::default();
     let written = prior(&scenario, &drawn).parameters;
@@ -194,7 +186,7 @@ fn found(
     let mut rig = SimulatedSlides::new(actual, mistake.copied());
     let found = identify_arm(&mut rig, scenario, drawn)
         .map_err(|error| failed(name, error, |error| CommandError::Input(error.into())))?;
-    Ok((found, format!("{REHEARSAL} with seed {seed}")))
+    Ok((found, Knowledge::rehearsal(seed)))
 }
 
 /// Identifies the arm behind a board; whatever ends it, the torque is off.

@@ -2,8 +2,8 @@
 
 use painleve_shared::settings;
 
-/// Beginning of the source of a scenario that a simulated arm has been measured for: it describes no real arm.
-pub const REHEARSAL: &str = "rehearsal";
+/// Beginning of the source of what a rehearsal has measured.
+const REHEARSAL: &str = "rehearsal";
 
 settings! {
     /// Standard deviations of an arm's geometry and joints, as `painleve identify` has written them: a record of how the arm is
@@ -36,5 +36,17 @@ settings! {
         coulomb_friction_nm: [f64; 2] = [0.0; 2], 0.0..=1e4, "N·m";
         /// Standard deviation of the stiffness of the spring in each joint.
         stiffness_nm_rad: [f64; 2] = [0.0; 2], 0.0..=1e6, "N·m/rad";
+    }
+}
+
+impl Knowledge {
+    /// Returns the source of what a rehearsal with this seed has measured: a simulated arm.
+    pub fn rehearsal(seed: u64) -> String {
+        format!("{REHEARSAL} with seed {seed}")
+    }
+
+    /// Returns whether a rehearsal has written it: it describes no real arm.
+    pub fn is_rehearsed(&self) -> bool {
+        self.source.starts_with(REHEARSAL)
     }
 }

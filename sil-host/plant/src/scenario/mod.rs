@@ -7,7 +7,7 @@ pub mod built_in;
 pub mod describe;
 mod error;
 mod initial_key;
-pub mod knowledge;
+mod knowledge;
 mod load;
 mod override_key;
 mod plant;
