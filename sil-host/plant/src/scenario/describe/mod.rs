@@ -29,7 +29,7 @@ impl Scenario {
     /// # Errors
     /// For a seed of 2^63 or more, which TOML cannot write.
     pub fn to_toml(&self) -> Result<String, toml::ser::Error> {
-        toml::to_string(self)
+        toml::to_string(self as &dyn erased_serde::Serialize)
     }
 
     /// Returns every key of the scenario that is not absent as JSON.
