@@ -91,8 +91,9 @@ fn a_rehearsals_scenario_drives_no_real_arm() {
     let bench = Bench::new("rehearsed");
     let rehearsal = bench.run(&["commission", "--rehearse"]);
     assert!(rehearsal.status.success(), "{}", errors(&rehearsal));
-    for command in ["drive", "identify"] {
-        let refused = bench.run(&[command, "out/rehearsed.toml", "--port", "/dev/null"]);
+    for command in [&["drive"][..], &["drive", "--store"], &["identify"]] {
+        let of_rehearsal = ["out/rehearsed.toml", "--port", "/dev/null"];
+        let refused = bench.run(&[command, &of_rehearsal].concat());
         assert_eq!(code(refused.status), 2, "{}", errors(&refused));
         let reason = "describes a simulated arm (knowledge.source: rehearsal with seed 1)";
         assert!(errors(&refused).contains(reason), "{}", errors(&refused));

@@ -13,6 +13,9 @@ use crate::{CommandError, say};
 /// # Errors
 /// [`CommandError`] if the board does not answer, refuses the configuration or does not store it.
 pub fn run(arguments: &DriveArguments, scenario: &Scenario) -> Result<(), CommandError> {
+    if arguments.store {
+        super::check_commissioned(scenario)?;
+    }
     let mut board = Serial::connect(&arguments.port)?;
     board.identify()?;
     let stored = if arguments.store {
