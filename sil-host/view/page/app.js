@@ -69,10 +69,10 @@ class Page {
   compare(comparison) {
     if (!comparison) { for (const only of document.querySelectorAll("[data-compare]")) only.remove(); return; }
     const colours = ["--orange", "--blue", "--green", "--purple", "--sky", "--red"];
-    const others = comparison.others.map(({ label, shift_s, rows }, number) => {
+    const others = comparison.others.map(({ label, shift_s, rows, arm }, number) => {
       const columns = new Columns(this.run.columns, this.run.byte_columns);
       columns.append(bytesOfBase64(rows));
-      return { label, shift: shift_s, columns, colour: colours[number % colours.length] };
+      return { label, shift: shift_s, columns, arm, colour: colours[number % colours.length] };
     });
     this.arm.others = this.charts.others = others;
     document.title = `${[comparison.label, ...others.map(({ label }) => label)].join(" · ")} · painleve`;

@@ -49,12 +49,13 @@ class ArmView {
       g.fillStyle = k.orange;
       g.beginPath(); g.moveTo(x(reference), beltY + 3); g.lineTo(x(reference) - 6, beltY + 15); g.lineTo(x(reference) + 6, beltY + 15); g.fill();
     }
-    for (const { columns, shift, colour } of this.others ?? []) {
+    for (const { columns, shift, colour, arm: other } of this.others ?? []) {
+      const { height_m, link_length_m: [m1, m2] } = other;
       const at = Math.min(Math.max(time - shift, columns.start), columns.end);
       const [b1, b2] = [columns.at("theta1_rad", at), columns.at("theta2_rad", at)];
-      const bend = [l1 * Math.sin(b1), arm.height_m - l1 * Math.cos(b1)];
+      const bend = [m1 * Math.sin(b1), height_m - m1 * Math.cos(b1)];
       g.strokeStyle = ink(colour); g.lineWidth = 3; g.setLineDash([7, 4]);
-      g.beginPath(); g.moveTo(x(0), y(arm.height_m)); g.lineTo(x(bend[0]), y(bend[1])); g.lineTo(x(bend[0] + l2 * Math.sin(b2)), y(bend[1] - l2 * Math.cos(b2))); g.stroke();
+      g.beginPath(); g.moveTo(x(0), y(height_m)); g.lineTo(x(bend[0]), y(bend[1])); g.lineTo(x(bend[0] + m2 * Math.sin(b2)), y(bend[1] - m2 * Math.cos(b2))); g.stroke();
       g.setLineDash([]);
     }
     // Base.

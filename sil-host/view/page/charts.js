@@ -20,9 +20,11 @@ class Charts {
 
   /** Whether a curve has anything to show. A chart without such a curve is left out. */
   has(name) {
-    const values = this.columns[name], { length } = this.columns;
-    for (let i = 0; i < length; i++) if (Number.isFinite(values[i]) && values[i] !== 0) return true;
-    return false;
+    return [this, ...this.others].some(({ columns }) => {
+      const values = columns[name], { length } = columns;
+      for (let i = 0; i < length; i++) if (Number.isFinite(values[i]) && values[i] !== 0) return true;
+      return false;
+    });
   }
 
   build(all = false) {

@@ -33,6 +33,7 @@ pub fn comparison_html(
         "aligned": format!("Aligned at {}", comparison.alignment),
         "others": others.map(|((number, run), rows)| json!({
             "label": run.label, "shift_s": comparison.shift_s(number), "rows": rows,
+            "arm": description(run.scenario.as_ref().unwrap_or(scenario))["arm"],
         })).collect::<Vec<_>>(),
         "tables": tables(runs, outcomes, differences),
     });
