@@ -4,7 +4,7 @@
 
 use std::collections::VecDeque;
 use std::mem;
-use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
 
 use painleve_firmware::telemetry::Telemetry;
@@ -30,8 +30,6 @@ const MOST_ENTRIES: usize = 8192;
 pub struct Hub {
     pub(crate) pages: Group<PageQueue>,
     pub(crate) clients: Group<ClientQueue>,
-    /// Whether any Foxglove client has subscribed to a channel.
-    has_subscribers: AtomicBool,
     /// Number of resets of the run.
     session: AtomicU64,
     parameters: Mutex<Vec<Parameter>>,
@@ -117,7 +115,8 @@ impl Hub {
 
     /// Returns whether any Foxglove client has subscribed to a channel.
     pub fn has_subscribers(&self) -> bool {
-        self.has_subscribers.load(Ordering::Relaxed)
+        let clients = locked(&self.clients.queues);
+        clients.iter().any(|queue| locked(queue).is_subscribed)
     }
 
     /// Passes rows and events to every page.
@@ -211,19 +210,6 @@ impl Hub {
     /// Sets whether a client has subscribed to any channel.
     pub(crate) fn set_subscribed(&self, queue: &Mutex<ClientQueue>, is_subscribed: bool) {
         locked(queue).is_subscribed = is_subscribed;
-        self.update_subscribers();
-    }
-
-    /// Forgets a client.
-    pub(crate) fn leave(&self, queue: &Arc<Mutex<ClientQueue>>) {
-        self.clients.leave(queue);
-        self.update_subscribers();
-    }
-
-    fn update_subscribers(&self) {
-        let mut any = false;
-        self.clients.each(|queue| any |= queue.is_subscribed);
-        self.has_subscribers.store(any, Ordering::Relaxed);
     }
 }
 
@@ -256,13 +242,12 @@ impl ClientQueue {
 /// The queues of one kind of viewer.
 #[derive(Debug, Default)]
 pub(crate) struct Group<T> {
-    count: AtomicUsize,
     queues: Mutex<Vec<Arc<Mutex<T>>>>,
 }
 
 impl<T: Default> Group<T> {
     pub(crate) fn count(&self) -> usize {
-        self.count.load(Ordering::Relaxed)
+        locked(&self.queues).len()
     }
 
     fn each(&self, mut visit: impl FnMut(&mut T)) {
@@ -279,13 +264,10 @@ impl<T: Default> Group<T> {
         }
         let queue = Arc::<Mutex<T>>::default();
         queues.push(queue.clone());
-        self.count.store(queues.len(), Ordering::Relaxed);
         Some(queue)
     }
 
     pub(crate) fn leave(&self, queue: &Arc<Mutex<T>>) {
-        let mut queues = locked(&self.queues);
-        queues.retain(|other| !Arc::ptr_eq(other, queue));
-        self.count.store(queues.len(), Ordering::Relaxed);
+        locked(&self.queues).retain(|other| !Arc::ptr_eq(other, queue));
     }
 }

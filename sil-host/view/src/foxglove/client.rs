@@ -77,7 +77,7 @@ pub(crate) fn serve(socket: WebSocket<TcpStream>, hub: &Hub, desk: Desk) {
     if client.greet().is_ok() {
         while client.exchange().is_ok() {}
     }
-    hub.leave(&queue);
+    hub.clients.leave(&queue);
 }
 
 struct Client<'a> {
