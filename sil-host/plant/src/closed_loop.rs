@@ -1,7 +1,7 @@
 //! The closed loop: sample, exchange, record, advance, tick by tick.
 
 use hdrhistogram::Histogram;
-use painleve_shared::frame::{ActuatorFrame, SensorFrame};
+use painleve_shared::frame::{ActuatorFrame, SensorFrame, StatusFlags};
 use painleve_shared::status::Fault;
 use xxhash_rust::xxh3::Xxh3;
 
@@ -213,6 +213,8 @@ pub struct LoopResult {
     pub final_tip_t_m: f64,
     /// Reference at the end, m.
     pub final_reference_m: f64,
+    /// Whether an edge holds the reference back at the end.
+    pub at_edge: bool,
     /// Ticks on which the controller limited its torque.
     pub saturated_ticks: u64,
     /// Ticks without an answer in time.
@@ -290,8 +292,8 @@ impl<H: ControllerHost, P: Plant> ClosedLoop<H, P> {
             }
             self.log.actuator(answer);
             self.last_answer = *answer;
-            let saturated = painleve_shared::frame::StatusFlags::SATURATED;
-            self.saturated_ticks += u64::from(answer.flags.contains(saturated));
+            let saturated = answer.flags.contains(StatusFlags::SATURATED);
+            self.saturated_ticks += u64::from(saturated);
         }
         // A late answer that reports a fault takes effect, but does not answer this tick.
         let answered = frame.is_some_and(|answer| answer.tick == sensor.tick);
@@ -325,6 +327,7 @@ impl<H: ControllerHost, P: Plant> ClosedLoop<H, P> {
             smoothness: self.smoothness,
             final_tip_t_m: self.simulation.plant().snapshot().tip_t_m,
             final_reference_m: self.last_answer.reference_tip.to_metres(),
+            at_edge: self.last_answer.flags.contains(StatusFlags::AT_EDGE),
             saturated_ticks: self.saturated_ticks,
             stale_ticks: self.stale_ticks,
             drive_watchdog_tick: self.drive_watchdog_tick,

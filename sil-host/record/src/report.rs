@@ -78,7 +78,8 @@ pub struct RunReport {
     /// Distance of the tip from the governed reference at the end, m.
     #[serde(default)]
     pub error_m: f64,
-    /// Part of the governor's distance from the edges that is kept for what is not known of the arm, m.
+    /// Part of the governor's distance from the edges that is kept for what is not known of the arm, m; 0 unless an edge
+    /// holds the reference back at the end.
     #[serde(default)]
     pub distance_for_knowledge_m: f64,
     /// Smallest normal force after the first 50 ms, N; null for shorter runs.
@@ -166,7 +167,11 @@ impl RunReport {
                 .target_m()
                 .filter(|_| scenario.controller.law.name() != "off"),
             error_m: (result.final_tip_t_m - result.final_reference_m).abs(),
-            distance_for_knowledge_m: distance_for_knowledge_m(scenario),
+            distance_for_knowledge_m: if result.at_edge {
+                distance_for_knowledge_m(scenario)
+            } else {
+                0.0
+            },
             min_normal_force_n: force.is_finite().then_some(force),
             peak_torque_nm: statistics.peak_torque_nm,
             torque_change_moving_nm: smoothness.moving.torque_change_nm(converters),
@@ -310,7 +315,7 @@ impl RunReport {
         if let Some(column) = table.column_mut(0) {
             column.set_cell_alignment(CellAlignment::Right);
         }
-        table.to_string()
+        terminal::readable_table(table)
     }
 }
 
