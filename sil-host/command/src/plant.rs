@@ -13,7 +13,6 @@ use painleve_plant::scenario::{Scenario, ScenarioError};
 use painleve_plant::simulation::Simulation;
 use painleve_process::interrupt::Interrupt;
 use painleve_process::realtime::request_realtime;
-use painleve_process::terminal;
 use painleve_record::report::{DurationPercentiles, RunReport};
 use painleve_shared::status::Fault;
 use serde::{Deserialize, Serialize};
@@ -189,7 +188,7 @@ pub fn print(report: &RunReport, json: bool) -> Result<(), CommandError> {
     let text = if json {
         serde_json::to_string(report).map_err(output)?
     } else {
-        terminal::readable(report.table())
+        report.table()
     };
     say(text)
 }

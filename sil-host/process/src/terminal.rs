@@ -78,10 +78,12 @@ pub fn readable(text: impl Display) -> String {
 /// Returns a table for readers: in ASCII where the locale asks for it, and with one line for each cell
 /// where the terminal is too narrow for the words of a row.
 pub fn readable_table(table: Table) -> String {
+    // Before the widths are chosen: some replacements are wider than their symbols.
+    let text = narrow(with_cells(table, |text| readable(text))).to_string();
     if is_ascii_only() {
-        to_ascii(&narrow(with_ascii_cells(table)).to_string())
+        to_ascii(&text)
     } else {
-        narrow(table).to_string()
+        text
     }
 }
 
@@ -128,20 +130,19 @@ fn narrow(mut table: Table) -> Table {
     lines
 }
 
-/// Returns a table whose cells are in ASCII before their widths are chosen: some replacements are
-/// wider than their symbols.
-fn with_ascii_cells(mut table: Table) -> Table {
-    let ascii = |row: &Row| -> Vec<Cell> {
+/// Returns a table with the text of each cell replaced.
+fn with_cells(mut table: Table, replaced: impl Fn(&str) -> String) -> Table {
+    let replaced = |row: &Row| -> Vec<Cell> {
         let cells = row.cell_iter();
         cells
-            .map(|cell| Cell::new(to_ascii(&cell.content())))
+            .map(|cell| Cell::new(replaced(&cell.content())))
             .collect()
     };
-    if let Some(header) = table.header().map(ascii) {
+    if let Some(header) = table.header().map(replaced) {
         table.set_header(header);
     }
     for row in table.row_iter_mut() {
-        *row = Row::from(ascii(row));
+        *row = Row::from(replaced(row));
     }
     table
 }
@@ -189,11 +190,18 @@ pub fn to_ascii(text: &str) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::{narrow, readable, table, to_ascii, with_ascii_cells};
+    use super::{narrow, readable, readable_table, table, to_ascii, with_cells};
 
     #[test]
     fn control_characters_are_shown_and_not_sent() {
         assert_eq!(readable("a\u{1b}[31m\tb\n"), "a\\u{1b}[31m\tb\n");
+        let mut table = table(["file"]);
+        table.add_row(["a\u{1b}[31m"]);
+        let text = readable_table(table);
+        assert!(
+            text.contains("a\\u{1b}[31m") && !text.contains('\u{1b}'),
+            "{text}"
+        );
     }
 
     #[test]
@@ -206,7 +214,7 @@ mod tests {
     fn the_lines_of_a_table_in_ascii_are_equally_wide() {
         let mut table = table(["μ", "θ₁ (°)"]);
         table.add_row(["0.1 … 0.2", "≤ 3"]).add_row(["0", "1"]);
-        let text = to_ascii(&with_ascii_cells(table).to_string());
+        let text = to_ascii(&with_cells(table, to_ascii).to_string());
         let widths: Vec<usize> = text.lines().map(str::len).collect();
         assert!(widths.iter().all(|width| *width == widths[0]), "{text}");
         assert!(text.contains("| 0.1 ... 0.2 | <= 3         |"), "{text}");
