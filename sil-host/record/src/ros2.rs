@@ -54,6 +54,7 @@ pub fn to_bag<W: Write + Seek>(
     if bag.ticks == 0 {
         return Err(ExportError::NoTicks);
     }
+    bag.write_state()?;
     bag.writer.finish()?;
     Ok((bag.writer.into_inner(), bag.ticks))
 }
@@ -65,8 +66,9 @@ struct Bag<W: Write + Seek> {
     topics: [u16; TOPICS.len()],
     joints: u16,
     contact: u16,
-    /// Time by the clock of the last state of the joints.
-    joints_ns: Option<u64>,
+    /// Time by the clock of the state to be written, and its fields.
+    state_ns: u64,
+    state: Map<String, Value>,
     /// Time by the clock of the last tick.
     tick_ns: Option<u64>,
     /// Number of ticks.
@@ -126,7 +128,8 @@ impl<W: Write + Seek> Bag<W> {
             topics,
             joints,
             contact,
-            joints_ns: None,
+            state_ns: 0,
+            state: Map::new(),
             tick_ns: None,
             ticks: 0,
         })
@@ -161,18 +164,25 @@ impl<W: Write + Seek> Bag<W> {
         }
         self.write(self.topics[message.topic], stamp_ns, &cdr.0)?;
         self.ticks += u64::from(self.tick_ns.replace(stamp_ns) != Some(stamp_ns));
-        let is_plant = topic.name == PLANT.name;
-        // A real arm's angles are known as estimates only.
-        let is_state = is_plant || topic.name == ESTIMATES.name && self.joints_ns != Some(stamp_ns);
-        if is_state && fields.contains_key("theta1_rad") {
-            self.joints_ns = Some(stamp_ns);
-            self.state(stamp_ns, &fields)?;
+        if [PLANT.name, ESTIMATES.name].contains(&topic.name) {
+            if stamp_ns != self.state_ns {
+                self.write_state()?;
+                self.state_ns = stamp_ns;
+            }
+            // What no sensor of a real arm measures is known as an estimate.
+            for (name, value) in fields.into_iter().filter(|(_, value)| !value.is_null()) {
+                self.state.entry(name).or_insert(value);
+            }
         }
         Ok(())
     }
 
-    /// Writes the joints and the contact.
-    fn state(&mut self, stamp_ns: u64, fields: &Map<String, Value>) -> Result<(), ExportError> {
+    /// Writes the joints and the contact, if they are known.
+    fn write_state(&mut self) -> Result<(), ExportError> {
+        let (stamp_ns, fields) = (self.state_ns, std::mem::take(&mut self.state));
+        if !fields.contains_key("theta1_rad") {
+            return Ok(());
+        }
         let value = |name: &str| fields.get(name).and_then(Value::as_f64).unwrap_or(f64::NAN);
         // The elbow's encoder measures θ2 − θ1.
         let joints = |first: &str, second: &str| [value(first), value(second) - value(first)];
@@ -299,6 +309,31 @@ mod tests {
             let error = to_bag(start_ns).unwrap_err();
             assert!(error.contains("later than January 2038"), "{error}");
         }
+    }
+
+    #[test]
+    fn what_a_real_arms_sensors_do_not_show_is_taken_from_the_estimates() {
+        let mut bag = Bag::new(0, io::Cursor::new(Vec::new())).unwrap();
+        for (name, json) in [
+            (
+                PLANT.name,
+                r#"{"theta1_rad": 0.1, "theta1_dot_rad_s": null}"#,
+            ),
+            (
+                ESTIMATES.name,
+                r#"{"theta1_rad": 0.2, "theta1_dot_rad_s": 2.0}"#,
+            ),
+        ] {
+            let topic = TOPICS.iter().position(|topic| topic.name == name).unwrap();
+            let message = RecordedMessage {
+                topic,
+                time_ns: 5,
+                json: json.as_bytes(),
+            };
+            bag.take_in(message).unwrap();
+        }
+        assert_eq!(bag.state["theta1_rad"], 0.1);
+        assert_eq!(bag.state["theta1_dot_rad_s"], 2.0);
     }
 
     #[test]
