@@ -257,7 +257,7 @@ pub fn run(arguments: &RunArguments) -> Result<(), CommandError> {
         pair: Some(pair),
         quiet: arguments.quiet,
     };
-    let mut controller = RunProcess::start(&controller_plan(arguments, join), stderr)?;
+    let mut controller = RunProcess::start(&controller_plan(arguments, &scenario, join), stderr)?;
 
     let status = watch(
         &mut plant,
@@ -412,10 +412,10 @@ fn watch(
 }
 
 /// Returns the plan of the process that runs the controller or leads to it.
-fn controller_plan(arguments: &RunArguments, plant: JoinArguments) -> Plan {
+fn controller_plan(arguments: &RunArguments, scenario: &Scenario, plant: JoinArguments) -> Plan {
     let bus = BusArguments {
         plant,
-        scenario_name: arguments.scenario.name().to_owned(),
+        scenario_name: scenario.name.clone(),
     };
     let image = arguments.image.clone();
     let target = match arguments.host {
