@@ -1,8 +1,6 @@
 //! Conditions under which a finished run counts as failed: `painleve run --fail-on
 //! fault,lift-off,missed-deadline`.
 
-use std::fmt;
-
 use clap::ValueEnum;
 use painleve_record::report::RunReport;
 use painleve_shared::status::Fault;
@@ -21,42 +19,21 @@ pub enum FailOn {
 }
 
 impl FailOn {
-    /// Returns the event, if it happened.
-    fn found(self, report: &RunReport) -> Option<FailedCondition> {
+    /// Returns the event in words, if it happened.
+    fn found(self, report: &RunReport) -> Option<String> {
         match self {
-            Self::Fault => report.fault.map(FailedCondition::Fault),
+            Self::Fault => report.fault.map(|number| {
+                let description = Fault::from_code(number).map_or("", Fault::description);
+                format!("fault {number} ({description})")
+            }),
             Self::LiftOff => {
                 let count = report.lift_offs;
-                (count > 0).then_some(FailedCondition::LiftOffs(count))
+                (count > 0).then(|| format!("lift-offs: {count}"))
             }
             Self::MissedDeadline => {
                 let count = report.missed_deadlines.unwrap_or(0);
-                (count > 0).then_some(FailedCondition::MissedDeadlines(count))
+                (count > 0).then(|| format!("missed deadlines: {count}"))
             }
-        }
-    }
-}
-
-/// An event that failed a run.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum FailedCondition {
-    /// The latched fault's number.
-    Fault(u8),
-    /// Number of lift-offs.
-    LiftOffs(u64),
-    /// Number of missed deadlines.
-    MissedDeadlines(u64),
-}
-
-impl fmt::Display for FailedCondition {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Fault(number) => {
-                let description = Fault::from_code(*number).map_or("", Fault::description);
-                write!(f, "fault {number} ({description})")
-            }
-            Self::LiftOffs(count) => write!(f, "lift-offs: {count}"),
-            Self::MissedDeadlines(count) => write!(f, "missed deadlines: {count}"),
         }
     }
 }
@@ -66,7 +43,7 @@ impl fmt::Display for FailedCondition {
 /// # Errors
 /// [`CommandError::FailedOn`], naming all of them.
 pub fn check(asked: &[FailOn], report: &RunReport) -> Result<(), CommandError> {
-    let found: Vec<FailedCondition> = asked.iter().filter_map(|one| one.found(report)).collect();
+    let found: Vec<String> = asked.iter().filter_map(|one| one.found(report)).collect();
     if found.is_empty() {
         Ok(())
     } else {

@@ -70,7 +70,6 @@ use painleve_study_core::options::number;
 use painleve_study_sweep::SweepError;
 
 use commission::{BoardRigError, CommissionArguments};
-use fail_on::FailedCondition;
 use identify::IdentifyArguments;
 use output_error::{InputError, OutputError, output};
 use plan::Plan;
@@ -224,8 +223,8 @@ pub enum CommandError {
     #[error("the drive has latched fault {}: {}", *.0 as u8, .0.description())]
     Faulted(Fault),
     /// The run met a condition of --fail-on.
-    #[error("--fail-on: {}", .0.iter().map(ToString::to_string).collect::<Vec<_>>().join(", "))]
-    FailedOn(Vec<FailedCondition>),
+    #[error("--fail-on: {}", .0.join(", "))]
+    FailedOn(Vec<String>),
     /// In real time, too many consecutive ticks were late or lost.
     #[error("the controller missed its deadlines and removed the torque: {}", .0.description())]
     DeadlinesMissed(Fault),
