@@ -53,16 +53,28 @@ def place():
     return Path(f"/tmp/painleve-{user}")
 
 
+FLOCK = "hhqqi4x"
+
+
 def lock(file, byte):
     """Locks one byte of a file until the process ends, however it ends."""
-    flock = struct.pack("hhqqi4x", fcntl.F_WRLCK, os.SEEK_SET, byte, 1, 0)
-    fcntl.fcntl(file, fcntl.F_OFD_SETLK, flock)
+    fcntl.fcntl(file, fcntl.F_OFD_SETLK, struct.pack(FLOCK, fcntl.F_WRLCK, os.SEEK_SET, byte, 1, 0))
+
+
+def is_locked(path, byte):
+    """Returns whether a living process has locked one byte of a file."""
+    try:
+        with open(path, "r+b", buffering=0) as file:
+            answer = fcntl.fcntl(file, fcntl.F_OFD_GETLK, struct.pack(FLOCK, fcntl.F_WRLCK, os.SEEK_SET, byte, 1, 0))
+    except FileNotFoundError:
+        return False
+    return struct.unpack(FLOCK, answer)[0] != fcntl.F_UNLCK
 
 
 class Bus:
     """The controller's end of a bus. Iterate over it for sensor frames; `send` answers them."""
 
-    CONTROLLER = 2
+    PLANT, CONTROLLER = 1, 2
 
     def __init__(self, name, controller, wait_s=10.0):
         """Joins the plant on bus `name`; `controller` is its name in the plant's report."""
@@ -103,9 +115,10 @@ class Bus:
         (run / "answering.new").write_text(controller)
         (run / "answering.new").rename(run / "answering")
 
-    @staticmethod
-    def _ready_run(folder):
-        runs = folder.iterdir() if folder.is_dir() else ()
+    @classmethod
+    def _ready_run(cls, folder):
+        # A plant that was killed leaves its run as it was.
+        runs = folder.iterdir() if is_locked(folder / "lock", cls.PLANT) else ()
         waiting = (run for run in runs if (run / "ready").exists() and not (run / "joined").exists())
         return next(waiting, None)
 
