@@ -37,18 +37,11 @@ pub fn run_chore() -> Result<(), ChoreError> {
             WHEELS,
         ],
     )?;
-    let install = [
-        "-m",
-        "pip",
-        "install",
-        "--quiet",
-        "--force-reinstall",
-        "--no-index",
-        "--find-links",
-        WHEELS,
-        "painleve",
-    ];
-    run(&python, &install)?;
+    // Wheels of other versions stay in their folder.
+    let wheel = wheel()?;
+    let install = ["-m", "pip", "install", "--quiet", "--force-reinstall"];
+    let file = ["--no-index", &wheel.to_string_lossy()];
+    run(&python, &[&install[..], &file].concat())?;
     run(&python, &["-m", "pytest", "-q", "python/tests"])
 }
 
