@@ -25,10 +25,12 @@ pub fn run_chore() -> Result<(), ChoreError> {
 /// If the build fails.
 pub fn build(target: &str, environment: &[(&str, &str)]) -> Result<PathBuf, ChoreError> {
     // The crate is a workspace of its own; its bundler takes the target folder from the environment.
-    let bundle = ["run", "--release", "--manifest-path", "fmu/Cargo.toml"];
+    let bundle = ["run", "--release", "--locked"];
+    let of = ["--manifest-path", "fmu/Cargo.toml"];
     let target = workspace().join(target);
     let folder = target.to_string_lossy();
     let folder = [("CARGO_TARGET_DIR", folder.as_ref())];
-    run_with(&cargo(), &bundle, &[&folder, environment].concat())?;
+    let line = [&bundle[..], &of].concat();
+    run_with(&cargo(), &line, &[&folder, environment].concat())?;
     Ok(target.join("fmu/painleve.fmu"))
 }
