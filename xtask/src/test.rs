@@ -82,8 +82,10 @@ pub fn run(arguments: &TestArguments) -> Result<(), ChoreError> {
         took.push((start.elapsed(), name));
     };
     keep("tests of the workspace", &mut || {
-        left_out.extend(workspace_tests(arguments)?);
-        Ok(())
+        workspace_tests(arguments, &mut left_out)
+    });
+    keep("tests of the documentation", &mut || {
+        run_cargo(&["test", "--workspace", "--profile", PROFILE, "--doc"])
     });
     if arguments.all {
         for (name, mut step) in FURTHER_STEPS {
@@ -121,9 +123,12 @@ pub fn run(arguments: &TestArguments) -> Result<(), ChoreError> {
     ))
 }
 
-/// Runs the tests of all packages, with nextest where it is installed, and those of the documentation. Returns what
-/// tests said that they skipped.
-fn workspace_tests(arguments: &TestArguments) -> Result<Vec<String>, ChoreError> {
+/// Runs the tests of all packages, with nextest where it is installed, and adds what they said that they skipped to
+/// `left_out`, whether they pass or not.
+fn workspace_tests(
+    arguments: &TestArguments,
+    left_out: &mut Vec<String>,
+) -> Result<(), ChoreError> {
     let notices = tempfile::NamedTempFile::new()
         .map_err(|cause| ChoreError(format!("no temporary file: {cause}")))?;
     let has_nextest = Command::new(cargo())
@@ -158,16 +163,7 @@ fn workspace_tests(arguments: &TestArguments) -> Result<Vec<String>, ChoreError>
         .envs(under_test())
         .env("PAINLEVE_SKIPPED", notices.path());
     eprintln!("$ cargo {}", line.join(" "));
-    let durations = passed_through(tests)?;
-    let is_listed = |rank: usize, seconds: f64| {
-        (arguments.durations && rank < LISTED) || (!arguments.all && seconds > LONGEST_TEST_S)
-    };
-    for (rank, (seconds, test)) in durations.iter().enumerate() {
-        if is_listed(rank, *seconds) {
-            say(&format!("{seconds:>8.1} s  {test}"))?;
-        }
-    }
-    run_cargo(&["test", "--workspace", "--profile", PROFILE, "--doc"])?;
+    let durations = passed_through(tests);
     let mut skipped: Vec<String> = fs::read_to_string(notices.path())
         .unwrap_or_default()
         .lines()
@@ -175,12 +171,21 @@ fn workspace_tests(arguments: &TestArguments) -> Result<Vec<String>, ChoreError>
         .collect();
     skipped.sort();
     skipped.dedup();
+    left_out.extend(skipped);
     if !has_nextest {
-        skipped.push(
+        left_out.push(
             "the tests that measure time apart from others, and the list of slow tests: cargo-nextest is missing".to_owned(),
         );
     }
-    Ok(skipped)
+    let is_listed = |rank: usize, seconds: f64| {
+        (arguments.durations && rank < LISTED) || (!arguments.all && seconds > LONGEST_TEST_S)
+    };
+    for (rank, (seconds, test)) in durations?.iter().enumerate() {
+        if is_listed(rank, *seconds) {
+            say(&format!("{seconds:>8.1} s  {test}"))?;
+        }
+    }
+    Ok(())
 }
 
 /// Runs a command and repeats its messages. Returns the tests that it timed, slowest first, with their seconds.
