@@ -2,11 +2,10 @@
 //! section `[package.metadata.board]` of its `Cargo.toml`.
 
 use std::path::Path;
-use std::process::Command;
 
 use serde_json::Value;
 
-use crate::command::{ChoreError, cargo, workspace};
+use crate::command::{ChoreError, answer, cargo, workspace};
 
 /// A board, as its `Cargo.toml` describes it.
 pub struct BoardPackage {
@@ -37,17 +36,12 @@ pub fn all() -> Result<Vec<BoardPackage>, ChoreError> {
 /// # Errors
 /// If cargo cannot read the workspace.
 pub fn packages(manifest: &Path) -> Result<Vec<Value>, ChoreError> {
-    let output = Command::new(cargo())
-        .args(["metadata", "--no-deps", "--format-version", "1"])
-        .arg("--manifest-path")
-        .arg(manifest)
-        .current_dir(workspace())
-        .output()
-        .map_err(|cause| ChoreError(format!("cannot start `cargo metadata`: {cause}")))?;
-    let mut metadata: Value = serde_json::from_slice(&output.stdout).map_err(|_| {
-        let reason = String::from_utf8_lossy(&output.stderr);
-        ChoreError(format!("`cargo metadata` failed: {}", reason.trim()))
-    })?;
+    let manifest = manifest.to_string_lossy();
+    let of = ["--manifest-path", &manifest];
+    let metadata = ["metadata", "--no-deps", "--format-version", "1"];
+    let metadata = answer(&cargo(), &[&metadata[..], &of].concat())?;
+    let mut metadata: Value = serde_json::from_str(&metadata)
+        .map_err(|cause| ChoreError(format!("`cargo metadata`: {cause}")))?;
     match metadata["packages"].take() {
         Value::Array(packages) => Ok(packages),
         _ => Err(ChoreError("`cargo metadata` lists no packages".into())),

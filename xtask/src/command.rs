@@ -80,6 +80,36 @@ pub fn run_with(
     }
 }
 
+/// Runs a program, which must succeed, and returns what it prints.
+///
+/// # Errors
+/// If it cannot be started or does not succeed.
+pub fn output(command: &mut Command) -> Result<String, ChoreError> {
+    let output = command.output();
+    let program = Path::new(command.get_program());
+    let name = program.file_name().unwrap_or(program.as_os_str()).display();
+    let output = output.map_err(|cause| ChoreError(format!("cannot start {name}: {cause}")))?;
+    if !output.status.success() {
+        let reason = String::from_utf8_lossy(&output.stderr);
+        let status = output.status;
+        return Err(ChoreError(format!(
+            "{name} fails ({status}): {}",
+            reason.trim()
+        )));
+    }
+    Ok(String::from_utf8_lossy(&output.stdout).into_owned())
+}
+
+/// Runs a program in the workspace's folder, and returns what it prints without the spaces around it.
+///
+/// # Errors
+/// As [`output`].
+pub fn answer(program: &str, arguments: &[&str]) -> Result<String, ChoreError> {
+    let mut command = Command::new(program);
+    let printed = output(command.args(arguments).current_dir(workspace()))?;
+    Ok(printed.trim().to_owned())
+}
+
 /// Runs cargo in the workspace's folder.
 ///
 /// # Errors

@@ -6,12 +6,12 @@
 
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output};
+use std::process::Command;
 use std::time::Instant;
 
 use clap::Args;
 
-use crate::command::{ChoreError, cargo, run, run_with, say, starts, workspace};
+use crate::command::{ChoreError, answer, cargo, output, run, run_with, say, starts, workspace};
 use crate::files::{copy, unwritable};
 use crate::{boards, build_fw, fmu, python, size};
 
@@ -203,8 +203,7 @@ impl Dist {
             run_with("maturin", &[&build[..], &of, &to].concat(), &environment)?;
             let wheel = self.wheel_for(processor)?;
             let auditwheel = workspace().join(ENVIRONMENT).join("bin/auditwheel");
-            let audit = output(Command::new(auditwheel).arg("show").arg(&wheel))?;
-            let report = String::from_utf8_lossy(&audit.stdout);
+            let report = output(Command::new(auditwheel).arg("show").arg(&wheel))?;
             let tag = format!("\"{WHEEL_TAG}_{processor}\"");
             if !report.replace('\n', " ").contains(&format!("tag: {tag}")) {
                 return Err(ChoreError(format!(
@@ -303,7 +302,7 @@ impl Dist {
             "cyclone_dx_json_1_4",
         ]))?;
         let path = self.folder.join("painleve.cdx.json");
-        fs::write(&path, sbom.stdout).map_err(|cause| unwritable(&path, &cause))
+        fs::write(&path, sbom).map_err(|cause| unwritable(&path, &cause))
     }
 
     /// Writes `SHA256SUMS` of all other files.
@@ -316,22 +315,9 @@ impl Dist {
         let mut sha256sum = Command::new("sha256sum");
         let sums = output(sha256sum.args(names).current_dir(&self.folder))?;
         let path = self.folder.join("SHA256SUMS");
-        fs::write(&path, &sums.stdout).map_err(|cause| unwritable(&path, &cause))?;
-        say(String::from_utf8_lossy(&sums.stdout).trim_end())
+        fs::write(&path, &sums).map_err(|cause| unwritable(&path, &cause))?;
+        say(sums.trim_end())
     }
-}
-
-/// Runs a program, which must succeed, and returns what it prints.
-fn output(command: &mut Command) -> Result<Output, ChoreError> {
-    let output = command.output();
-    let program = Path::new(command.get_program());
-    let name = program.file_name().unwrap_or(program.as_os_str()).display();
-    let output = output.map_err(|cause| ChoreError(format!("cannot start {name}: {cause}")))?;
-    if !output.status.success() {
-        let reason = String::from_utf8_lossy(&output.stderr);
-        return Err(ChoreError(format!("{name} fails: {}", reason.trim())));
-    }
-    Ok(output)
 }
 
 fn target(processor: &str) -> String {
@@ -357,18 +343,12 @@ fn remapping() -> Vec<String> {
 
 /// Returns the time of the commit that is built, s since 1970.
 fn commit_time() -> Result<String, ChoreError> {
-    let mut git = Command::new("git");
-    let time = output(
-        git.args(["log", "-1", "--format=%ct"])
-            .current_dir(workspace()),
-    )?;
-    Ok(String::from_utf8_lossy(&time.stdout).trim().to_owned())
+    answer("git", &["log", "-1", "--format=%ct"])
 }
 
 /// Converts a program with the `objcopy` of the Rust toolchain.
 fn convert(options: &[&str], from: &str, to: &str) -> Result<(), ChoreError> {
-    let sysroot = output(Command::new("rustc").args(["--print", "sysroot"]))?;
-    let sysroot = PathBuf::from(String::from_utf8_lossy(&sysroot.stdout).trim());
+    let sysroot = PathBuf::from(answer("rustc", &["--print", "sysroot"])?);
     let host = target(std::env::consts::ARCH);
     let objcopy = sysroot
         .join("lib/rustlib")

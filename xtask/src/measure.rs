@@ -10,13 +10,12 @@ use std::collections::HashMap;
 use std::collections::hash_map::Entry::{Occupied, Vacant};
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::Command;
 
 use clap::Args;
 use serde_json::Value;
 use toml::Table;
 
-use crate::command::{ChoreError, cargo, run_with, say, workspace};
+use crate::command::{ChoreError, answer, cargo, run_with, say, workspace};
 use crate::under_test::{build_program, program, run_tests};
 
 #[derive(Debug, Args)]
@@ -265,8 +264,8 @@ impl Here {
     fn new() -> Result<Self, ChoreError> {
         let mut here = Self {
             source: String::new(),
-            commit: output("git", &["describe", "--always", "--dirty", "--exclude=*"])?,
-            date: output("date", &["--iso-8601=date"])?,
+            commit: answer("git", &["describe", "--always", "--dirty", "--exclude=*"])?,
+            date: answer("date", &["--iso-8601=date"])?,
             machine: machine(),
         };
         let doctor = here.answer("painleve doctor --json")?;
@@ -279,7 +278,7 @@ impl Here {
     fn answer(&self, command: &str) -> Result<Value, ChoreError> {
         eprintln!("$ {command}");
         let arguments: Vec<&str> = command.split_whitespace().skip(1).collect();
-        let printed = output(&program().to_string_lossy(), &arguments)?;
+        let printed = answer(&program().to_string_lossy(), &arguments)?;
         serde_json::from_str(&printed).map_err(|cause| ChoreError(format!("`{command}`: {cause}")))
     }
 
@@ -348,21 +347,6 @@ fn machine() -> String {
     });
     let processors = std::thread::available_parallelism().map_or(1, usize::from);
     format!("{model}, {processors} processors")
-}
-
-/// Returns what a program prints.
-fn output(program: &str, arguments: &[&str]) -> Result<String, ChoreError> {
-    let failed =
-        |cause: String| ChoreError(format!("`{program} {}`: {cause}", arguments.join(" ")));
-    let done = Command::new(program)
-        .args(arguments)
-        .current_dir(workspace())
-        .output()
-        .map_err(|cause| failed(cause.to_string()))?;
-    if !done.status.success() {
-        return Err(failed(String::from_utf8_lossy(&done.stderr).into_owned()));
-    }
-    Ok(String::from_utf8_lossy(&done.stdout).trim().to_owned())
 }
 
 #[cfg(test)]

@@ -6,7 +6,7 @@ use std::process::{Command, Stdio};
 use serde_json::Value;
 
 use crate::build_fw;
-use crate::command::{ChoreError, cargo, run_cargo, run_with, workspace};
+use crate::command::{ChoreError, cargo, output, run_cargo, run_with, workspace};
 
 /// The profile of the program under test and of all tests.
 pub const PROFILE: &str = "verify";
@@ -82,17 +82,12 @@ pub fn run_tests(
 /// # Errors
 /// If it does not start, fails or prints something else.
 pub fn printed_json(arguments: &[&str]) -> Result<Value, ChoreError> {
-    let error = |what: &str| ChoreError(format!("`painleve {}` {what}", arguments.join(" ")));
-    let output = Command::new(program())
-        .args(arguments)
-        .current_dir(workspace())
-        .stderr(Stdio::inherit())
-        .output()
-        .map_err(|cause| error(&format!("does not start: {cause}")))?;
-    if !output.status.success() {
-        return Err(error(&format!("failed ({})", output.status)));
-    }
-    serde_json::from_slice(&output.stdout).map_err(|_| error("printed no report"))
+    let mut command = Command::new(program());
+    command.args(arguments).current_dir(workspace());
+    let printed = output(command.stderr(Stdio::inherit()))?;
+    let line = arguments.join(" ");
+    serde_json::from_str(&printed)
+        .map_err(|_| ChoreError(format!("`painleve {line}` printed no report")))
 }
 
 /// Builds images and program, and runs a program that tests them.

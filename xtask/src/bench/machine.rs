@@ -1,9 +1,8 @@
 //! Description of the machine on which the benchmarks ran.
 
 use std::fs;
-use std::process::Command;
 
-use crate::command::{ChoreError, workspace};
+use crate::command::{ChoreError, answer};
 
 /// A machine at one time.
 pub struct Machine {
@@ -32,6 +31,9 @@ impl Machine {
         let allowed = after("/proc/self/status", "Cpus_allowed_list").unwrap_or_default();
         let processors = processors(&allowed)
             .ok_or_else(|| ChoreError(format!("cannot read the processors \"{allowed}\"")))?;
+        let known = |program: &str, arguments: &[&str]| {
+            answer(program, arguments).unwrap_or_else(|_| "unknown".into())
+        };
         Ok(Self {
             model: after("/proc/cpuinfo", "model name").unwrap_or_else(|| "unknown".into()),
             processors,
@@ -39,8 +41,8 @@ impl Machine {
             governor: line("/sys/devices/system/cpu/cpu0/cpufreq/scaling_governor")
                 .unwrap_or_else(|_| "not visible".into()),
             load: load(),
-            commit: answer("git", &["rev-parse", "--short", "HEAD"]),
-            date: answer("date", &["--iso-8601=date"]),
+            commit: known("git", &["rev-parse", "--short", "HEAD"]),
+            date: known("date", &["--iso-8601=date"]),
         })
     }
 
@@ -91,17 +93,6 @@ fn processors(list: &str) -> Option<Vec<usize>> {
 fn load() -> String {
     let text = fs::read_to_string("/proc/loadavg").unwrap_or_default();
     text.split(' ').next().unwrap_or("unknown").to_owned()
-}
-
-fn answer(program: &str, arguments: &[&str]) -> String {
-    let done = Command::new(program)
-        .args(arguments)
-        .current_dir(workspace())
-        .output();
-    done.map_or_else(
-        |_| "unknown".into(),
-        |done| String::from_utf8_lossy(&done.stdout).trim().to_owned(),
-    )
 }
 
 #[cfg(test)]

@@ -8,13 +8,12 @@ mod samples;
 mod viewers;
 
 use std::fs;
-use std::process::Command;
 use std::time::Instant;
 
 use clap::Args;
 use serde_json::Value;
 
-use crate::command::{ChoreError, cargo, run_cargo, say, workspace};
+use crate::command::{ChoreError, answer, cargo, run_cargo, say, workspace};
 use crate::size;
 use machine::Machine;
 use samples::Samples;
@@ -87,19 +86,9 @@ fn with_table(text: &str, table: &str) -> Option<String> {
 
 /// Runs a program on some processors and returns what it prints.
 fn pinned(processors: &str, program: &str, arguments: &[&str]) -> Result<String, ChoreError> {
-    let line = format!("taskset -c {processors} {program} {}", arguments.join(" "));
-    eprintln!("$ {line}");
-    let done = Command::new("taskset")
-        .args(["-c", processors, program])
-        .args(arguments)
-        .current_dir(workspace())
-        .output()
-        .map_err(|cause| ChoreError(format!("cannot start `{line}`: {cause}")))?;
-    if !done.status.success() {
-        let reason = String::from_utf8_lossy(&done.stderr);
-        return Err(ChoreError(format!("`{line}` failed: {reason}")));
-    }
-    Ok(String::from_utf8_lossy(&done.stdout).into_owned())
+    let line = [&["-c", processors, program], arguments].concat();
+    eprintln!("$ taskset {}", line.join(" "));
+    answer("taskset", &line)
 }
 
 /// Runs a benchmark of a crate, after building it on all processors.

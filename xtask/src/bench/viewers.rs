@@ -61,7 +61,7 @@ pub fn rows(machine: &Machine, rows: &mut Vec<Row>) -> Result<(), ChoreError> {
         benchmark: "playing that page in headless Chromium, 1,200 × 900 pixels".into(),
         measured: if starts("node") && starts("chromium") {
             let script = ["tests/browser/frames.mjs", "chromium", PAGE];
-            pinned(&every, "node", &script)?.trim().into()
+            pinned(&every, "node", &script)?
         } else {
             "not measured: no node or no chromium".into()
         },
