@@ -39,7 +39,15 @@ def bounces(model, speed_m_s):
 def main(fmu):
     problems = validate_fmu(fmu)
     assert not problems, problems
-    folder = fmpy.extract(fmu, unzipdir=tempfile.mkdtemp())
+    with tempfile.TemporaryDirectory() as folder:
+        check(fmpy.extract(fmu, unzipdir=folder))
+
+    # The snippet of the documentation, which names the file that `cargo xtask fmu` writes.
+    [snippet] = re.findall(r"```python\n(import fmpy.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
+    exec(snippet, {})
+
+
+def check(folder):
     model = {"folder": folder, "description": fmpy.read_model_description(folder)}
     calls.check(pathlib.Path(folder), model["description"])
 
@@ -61,10 +69,6 @@ def main(fmu):
     bouncing = [speed for speed, _ in rows if bounces(model, speed)]
     assert bouncing == [speed for speed, expected in rows if expected], bouncing
     print(f"{len(bouncing)} of {len(rows)} belt speeds bounce, from {bouncing[0]} to {bouncing[-1]} m/s, as in the plant")
-
-    # The snippet of the documentation, which names the file that `cargo xtask fmu` writes.
-    [snippet] = re.findall(r"```python\n(import fmpy.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
-    exec(snippet, {})
 
 
 main(sys.argv[1])
