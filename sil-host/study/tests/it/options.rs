@@ -33,16 +33,57 @@ fn keys_that_the_study_itself_sets_are_refused() {
         ),
         ("capture --set run.enable_at_s=100", "run.enable_at_s"),
         ("capture --set run.duration_s=1", "run.duration_s"),
+        ("ringing --set initial.theta1_deg=1", "initial.theta1_deg"),
+        (
+            "ringing --set controller.reference=[]",
+            "controller.reference",
+        ),
+        (
+            "ringing --set controller.friction.first_guess=0.1",
+            "controller.friction.first_guess",
+        ),
+        (
+            "ringing --set controller.law.hybrid.force_integral_gain_per_s=1",
+            "controller.law.hybrid.force_integral_gain_per_s",
+        ),
+        ("ringing --set run.duration_s=2", "run.duration_s"),
+        ("effects --set initial.theta1_deg=1", "initial.theta1_deg"),
+        (
+            "effects --set controller.reference=[]",
+            "controller.reference",
+        ),
+        ("effects --set run.duration_s=2", "run.duration_s"),
+        (
+            "loop --tip=0.1 --set controller.response.enabled=true",
+            "controller.response.enabled",
+        ),
     ] {
         assert_eq!(
             refusal(line),
             format!("{key} has no effect here; the study sets it")
         );
     }
-    assert_eq!(
-        refusal("capture --set controller.contact.evidence=encoders"),
-        "accepted"
-    );
+    for line in [
+        "capture --set controller.contact.evidence=encoders",
+        "loop --tip=0.1 --set contact.kind=compliant --set controller.response.enabled=false",
+        "effects --runs 1 --contact compliant --effect none --set contact.stiffness_n_m=1e5",
+        "ablation --on rigid --set belt.friction=0.5",
+    ] {
+        assert_eq!(refusal(line), "accepted", "{line}");
+    }
+}
+
+#[test]
+fn another_contact_than_the_one_that_the_option_names_is_refused() {
+    for (line, option) in [
+        ("effects --contact rigid", "--contact"),
+        ("ablation --on soft", "--on"),
+    ] {
+        assert_eq!(
+            refusal(&format!("{line} --set contact.kind=compliant")),
+            format!("contact.kind has no effect here; use {option}")
+        );
+    }
 }
 
 #[test]

@@ -36,6 +36,7 @@ impl StudyOptions for Options {
     type Outcome = Ablation;
 
     fn study(&self) -> Result<AblationStudy, StudyError> {
+        self.runs.set.refuse(&[("contact.kind", "--on")])?;
         let study = AblationStudy {
             conditions: or_all(&self.conditions, Condition::value_variants()),
             parts: or_all(&self.without, Part::value_variants()),

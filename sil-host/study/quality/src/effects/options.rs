@@ -56,6 +56,9 @@ impl StudyOptions for Options {
     type Outcome = EffectsOutcome;
 
     fn study(&self) -> Result<EffectsStudy, StudyError> {
+        let set = &self.runs.set;
+        set.refuse(&[("contact.kind", "--contact")])?;
+        set.refuse_fixed(&["initial", "controller.reference", "run.duration_s"])?;
         let mut effects = vec![EFFECTS[0].name];
         if self.effect.is_empty() {
             effects.extend(EFFECTS[1..].iter().map(|effect| effect.name));

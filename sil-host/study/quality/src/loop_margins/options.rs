@@ -1,12 +1,13 @@
 //! Options of the study of loops.
 
 use clap::Args;
+use painleve_plant::mechanics::compliant::ContactKind;
 
 use super::{LoopMargins, LoopOutcome, Row};
 use painleve_study_core::catalogue::{InShards, StudyOptions, in_shards};
 use painleve_study_core::grid::once;
 use painleve_study_core::options::{ControllerOptions, Overrides, PostureOption};
-use painleve_study_core::{Grid, StudyError};
+use painleve_study_core::{Grid, Study, StudyError};
 
 /// The sampled loop in the frequency domain: Bode plots, margins and steps along the belt.
 #[derive(Debug, Args)]
@@ -57,6 +58,13 @@ impl StudyOptions for Options {
             overrides: self.overrides.overrides.clone(),
         };
         study.check()?;
+        for index in 0..study.len() {
+            // There the study switches the estimate of the response off.
+            if study.scenario(index, &[])?.contact.kind == ContactKind::Rigid {
+                self.overrides
+                    .refuse_fixed(&["controller.response.enabled"])?;
+            }
+        }
         Ok(study)
     }
 

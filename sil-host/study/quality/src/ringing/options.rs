@@ -40,6 +40,13 @@ impl StudyOptions for Options {
             ("contact.normal", "--damping"),
             ("controller.law.hybrid.friction", "--rate"),
         ])?;
+        self.overrides.refuse_fixed(&[
+            "initial",
+            "controller.reference",
+            "controller.friction.first_guess",
+            "controller.law.hybrid.force_integral_gain_per_s",
+            "run.duration_s",
+        ])?;
         let study = Ringing {
             stiffness_n_m: self.stiffness,
             dampings_ns_m: self.damping.values().to_vec(),
