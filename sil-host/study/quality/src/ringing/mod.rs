@@ -186,7 +186,7 @@ impl Study for Ringing {
     fn row(&self, index: usize) -> Result<Row, StudyError> {
         let (damping_ns_m, rate_per_s) = self.at(index);
         let base = self.base()?;
-        let arm = Arm::new(base.arm)?;
+        let arm = Arm::new(base.moving_arm())?;
         let line = BeltLine::new(&arm, POSTURE);
         let way = self.way(&arm, &base)?;
         let ratio = |tau| line.p_ratio(tau, base.belt.friction, slip(&base));
