@@ -7,7 +7,7 @@ use painleve_study_core::catalogue::{InShards, PageSection, StudyOptions, in_sha
 use painleve_study_core::figures::page_maker::PageMaker;
 use painleve_study_core::grid::once;
 use painleve_study_core::options::{
-    ControllerOptions, ConverterOptions, FrictionGrid, Overrides, PostureOption, metres, seconds,
+    ControllerOptions, ConverterOptions, FrictionGrid, Overrides, PostureOption, metres, number,
 };
 
 use super::{Criterion, Row, SlidingRange, SlidingRanges, page};
@@ -61,7 +61,7 @@ pub struct Options {
         long,
         value_name = "SECONDS",
         default_value_t = Criterion::default().patience_s,
-        value_parser = seconds
+        value_parser = patience
     )]
     patience_s: f64,
     /// Spacing of the targets tried first, m.
@@ -82,6 +82,11 @@ pub struct Options {
     resolution_m: f64,
     #[command(flatten)]
     overrides: Overrides,
+}
+
+/// Reads a time limit, within which the tip must be able to stay at its target for long enough.
+fn patience(text: &str) -> Result<f64, String> {
+    number(text, Criterion::default().stay_s..=1e6, "seconds")
 }
 
 impl StudyOptions for Options {
@@ -122,5 +127,19 @@ impl StudyOptions for Options {
 
     fn sections(page: &PageMaker<'_>) -> Result<Vec<PageSection>, StudyError> {
         page::sections(page)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_limit_within_which_no_target_can_be_reached_is_refused() {
+        assert_eq!(patience("2"), Ok(2.0));
+        for text in ["1.9", "0", "-3", "nan", "long"] {
+            let message = patience(text).unwrap_err();
+            assert_eq!(message, "give seconds from 2 to 1000000", "{text}");
+        }
     }
 }
