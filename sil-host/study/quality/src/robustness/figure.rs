@@ -61,7 +61,8 @@ impl Figure for RobustnessOutcome {
     }
 }
 
-/// Returns the success in each bin of a factor that has runs, with the bin's middle.
+/// Returns the success in each bin of a factor that has runs, with the bin's middle. An override can set a factor to a value
+/// outside its range, which no bin stands for.
 fn bins(
     rows: &[Row],
     (_, range, count, value): &Factor,
@@ -69,8 +70,9 @@ fn bins(
 ) -> Vec<(f64, Proportion)> {
     let width = (range.end - range.start) / *count as f64;
     let mut counts = vec![(0, 0); *count];
-    for row in rows {
-        let bin = ((value(row) - range.start) / width).max(0.0) as usize;
+    let is_shown = |row: &&Row| (range.start..=range.end).contains(&value(row));
+    for row in rows.iter().filter(is_shown) {
+        let bin = ((value(row) - range.start) / width) as usize;
         let (successes, runs) = &mut counts[bin.min(count - 1)];
         *successes += usize::from(criterion.holds(row.ending));
         *runs += 1;
@@ -138,6 +140,8 @@ mod tests {
         let found = bins(&rows, &FACTORS[0], Criterion::Kept);
         let counts: Vec<_> = found.iter().map(|(_, p)| (p.successes, p.runs)).collect();
         assert_eq!(counts, [(1, 2), (1, 1)]);
+        let outside = [0.19, 1.01, f64::NAN].map(|mu| row(mu, Ending::Reached));
+        assert!(bins(&outside, &FACTORS[0], Criterion::Kept).is_empty());
     }
 
     #[test]
