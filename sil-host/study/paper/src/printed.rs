@@ -5,6 +5,7 @@ use painleve_plant::mechanics::belt::BeltProfile;
 use painleve_plant::scenario::Scenario;
 use painleve_shared::{ArmParameters, Posture};
 use painleve_study_core::case::ControllerChoice;
+use painleve_study_core::initial::Initial;
 
 /// Friction coefficient of the paper's sections.
 pub const FRICTION: f64 = 0.6;
@@ -54,17 +55,22 @@ pub fn target_m(controller: &ControllerChoice, posture: Posture) -> f64 {
     }
 }
 
-/// Returns the paper's Fig. 12 result for a law and an initial condition.
-pub fn closed_loop_bounces(controller: &ControllerChoice, initial: &str) -> Option<&'static str> {
+/// Returns the paper's Fig. 12 result for a law, an initial condition and a target (m).
+pub fn closed_loop_bounces(
+    scenario: &Scenario,
+    controller: &ControllerChoice,
+    initial: Initial,
+    towards_m: f64,
+) -> Option<&'static str> {
+    let of_paper = scenario.arm == ArmParameters::default()
+        && scenario.belt.friction == FRICTION
+        && initial == Initial::D
+        && towards_m == target_m(controller, Posture::ElbowDown);
     match controller {
         ControllerChoice::Hybrid
         | ControllerChoice::HybridPaper
-        | ControllerChoice::HybridPaperModel
-            if initial == "d" =>
-        {
-            Some("never bounces")
-        }
-        _ => None,
+        | ControllerChoice::HybridPaperModel => of_paper.then_some("never bounces"),
+        ControllerChoice::Pid | ControllerChoice::Scenario(_) => None,
     }
 }
 

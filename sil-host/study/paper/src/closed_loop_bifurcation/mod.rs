@@ -88,6 +88,9 @@ pub struct Row {
     pub target_m: f64,
     /// Final tip position, m.
     pub tip_t_m: f64,
+    /// The paper's result for this law, initial condition, arm, friction and target, if it has one.
+    #[serde(skip)]
+    pub paper: Option<&'static str>,
 }
 
 impl ClosedLoopBifurcation {
@@ -215,6 +218,12 @@ impl LoopStudy for ClosedLoopBifurcation {
             fault: trial.fault().map(|fault| fault as u8),
             target_m: cell.target_m,
             tip_t_m: trial.tip_t_m(),
+            paper: printed::closed_loop_bounces(
+                &scenario,
+                cell.controller,
+                cell.initial,
+                cell.target_m,
+            ),
         })
     }
 }

@@ -6,7 +6,6 @@ use painleve_study_core::outcome::{self, Outcome};
 use serde::Serialize;
 
 use super::Row;
-use crate::printed;
 
 /// The whole diagram.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -40,6 +39,9 @@ pub struct BeltSpeedSection {
     pub max_theta1_dot_rad_s: f64,
     /// Largest final distance of the tip from its target, m.
     pub max_error_m: f64,
+    /// The paper's result, if it has one.
+    #[serde(skip)]
+    pub paper: Option<&'static str>,
 }
 
 impl BeltSpeedSection {
@@ -67,6 +69,7 @@ impl ClosedLoopDiagram {
                     faults: 0,
                     max_theta1_dot_rad_s: f64::NEG_INFINITY,
                     max_error_m: 0.0,
+                    paper: row.paper,
                 });
                 sections.len() - 1
             });
@@ -106,15 +109,14 @@ impl Outcome for ClosedLoopDiagram {
             "the paper",
         ]);
         for section in &self.sections {
-            let of_cells = |speeds: &[f64]| match (speeds.first(), speeds.last()) {
-                (Some(first), Some(last)) => {
-                    format!(
-                        "{} of {} ({first} … {last} m/s)",
-                        speeds.len(),
-                        section.cells
-                    )
+            let of_cells = |speeds: &[f64]| {
+                let count = format!("{} of {}", speeds.len(), section.cells);
+                let least = speeds.iter().copied().reduce(f64::min);
+                let most = speeds.iter().copied().reduce(f64::max);
+                match least.zip(most) {
+                    Some((least, most)) => format!("{count} ({least} … {most} m/s)"),
+                    None => count,
                 }
-                _ => format!("0 of {}", section.cells),
             };
             table.add_row([
                 section.controller.to_string(),
@@ -126,9 +128,7 @@ impl Outcome for ClosedLoopDiagram {
                 section.faults.to_string(),
                 format!("{:.3}", section.max_theta1_dot_rad_s),
                 format!("{:.2}", 1e3 * section.max_error_m),
-                printed::closed_loop_bounces(&section.controller, &section.initial)
-                    .unwrap_or("–")
-                    .into(),
+                section.paper.unwrap_or("–").into(),
             ]);
         }
         table

@@ -87,12 +87,10 @@ fn figure_12(outcome: &ClosedLoopDiagram, commands: Vec<String>) -> Section {
             cells.cells,
             cells.lifted_m_s.len()
         );
-        section.comparisons.push(
-            match printed::closed_loop_bounces(&cells.controller, &cells.initial) {
-                Some(paper) => Comparison::new(&what, paper, here, cells.bouncing_m_s.is_empty()),
-                None => Comparison::beyond(&what, here),
-            },
-        );
+        section.comparisons.push(match cells.paper {
+            Some(paper) => Comparison::new(&what, paper, here, cells.bouncing_m_s.is_empty()),
+            None => Comparison::beyond(&what, here),
+        });
     }
     section.reasons.push(SAMPLED_FRICTION.into());
     section

@@ -1,5 +1,7 @@
 //! Controllers that keep the tip on the belt, and one that does not.
 
+use painleve_study_core::outcome::Outcome;
+
 use super::*;
 
 fn study(controller: ControllerChoice) -> ClosedLoopBifurcation {
@@ -50,6 +52,66 @@ fn lift_offs_are_counted_and_the_rest_of_the_motion_is_recorded() {
     );
     assert_eq!(diagram.sections.len(), 1);
     assert_eq!(diagram.sections[0].lifted_m_s, [-0.9, -0.4]);
+}
+
+#[test]
+fn the_papers_result_stands_beside_its_own_case_only() {
+    let paper = |study: ClosedLoopBifurcation| study.row(0).unwrap().paper;
+    let short = ClosedLoopBifurcation {
+        reference: Reference::Step,
+        transient_s: 0.1,
+        record_s: 0.1,
+        ..study(ControllerChoice::Hybrid)
+    };
+    assert_eq!(paper(short.clone()), Some("never bounces"));
+    for other in [
+        ClosedLoopBifurcation {
+            mu: vec![0.5],
+            ..short.clone()
+        },
+        ClosedLoopBifurcation {
+            target_m: Some(0.1),
+            ..short.clone()
+        },
+        ClosedLoopBifurcation {
+            initial: vec![Initial::U],
+            ..short.clone()
+        },
+        ClosedLoopBifurcation {
+            overrides: vec!["arm.tip_mass_kg=0.01".into()],
+            ..short.clone()
+        },
+        ClosedLoopBifurcation {
+            controllers: vec![ControllerChoice::Pid],
+            ..short
+        },
+    ] {
+        assert_eq!(paper(other.clone()), None, "{other:?}");
+    }
+}
+
+#[test]
+fn belt_speeds_are_named_from_the_least_to_the_greatest() {
+    let row = |v_belt_m_s| Row {
+        controller: ControllerChoice::Hybrid,
+        converters: ConverterChoice::Hardware,
+        mu: 0.6,
+        v_belt_m_s,
+        initial: "d".into(),
+        max_theta1_dot_rad_s: 1.0,
+        bouncing: true,
+        contact_fraction: 0.5,
+        lift_offs: 0,
+        first_lift_off_s: None,
+        fault: None,
+        target_m: 0.1,
+        tip_t_m: 0.1,
+        paper: None,
+    };
+    let diagram = ClosedLoopDiagram::new([-0.4, -0.9, 0.2, -0.1].map(row).to_vec());
+    let table = diagram.table().to_string();
+    assert!(table.contains("4 of 4 (-0.9 … 0.2 m/s)"), "{table}");
+    assert!(table.contains("0 of 4"), "{table}");
 }
 
 #[test]
