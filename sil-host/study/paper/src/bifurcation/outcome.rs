@@ -146,6 +146,13 @@ impl Outcome for BifurcationDiagram {
             "paper: v_belt in m/s",
         ]);
         let stretch = |[from, to]: [f64; 2]| format!("{from} … {to}");
+        // The paper starts its own arm from x0,a and x0,d.
+        let is_of_paper = |initial: &str| {
+            printed::critical_friction(&self.settings.plant.arm).is_some()
+                && [Initial::A, Initial::D]
+                    .map(Initial::group)
+                    .contains(&initial)
+        };
         for window in &self.windows {
             let speeds: Vec<String> = window.v_belt_m_s.iter().copied().map(stretch).collect();
             table.add_row([
@@ -158,7 +165,11 @@ impl Outcome for BifurcationDiagram {
                 },
                 format!("{} of {}", window.bouncing, window.cells),
                 format!("{:.3}", window.max_theta1_dot_rad_s + 0.0),
-                window.paper_m_s.map_or("none".to_owned(), stretch),
+                match window.paper_m_s {
+                    Some(speeds) => stretch(speeds),
+                    None if is_of_paper(&window.initial) => "none".to_owned(),
+                    None => "–".to_owned(),
+                },
             ]);
         }
         table
