@@ -17,63 +17,6 @@ pub struct Grid {
     values: Vec<f64>,
 }
 
-/// Why a text is not a [`Grid`].
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum GridError {
-    /// The text holds no values.
-    #[error("'{text}' holds no values; give FROM:TO:STEP or a list, for example 0.4,0.6")]
-    Empty {
-        /// The given text.
-        text: String,
-    },
-    /// A part is not a number, or its magnitude is too large.
-    #[error(
-        "'{part}' in '{text}' is not a number from -{LARGEST:e} to {LARGEST:e}; give FROM:TO:STEP or a list a,b,c"
-    )]
-    NotFinite {
-        /// The given text.
-        text: String,
-        /// The invalid part.
-        part: String,
-    },
-    /// A range has two parts, or more than three.
-    #[error(
-        "'{text}' has {parts} parts; a range has three, FROM:TO:STEP, for example -1:-0.1:0.005"
-    )]
-    Parts {
-        /// The given text.
-        text: String,
-        /// Number of parts.
-        parts: usize,
-    },
-    /// The step of the range is zero.
-    #[error("'{text}' has step 0; give a step that leads from FROM to TO")]
-    ZeroStep {
-        /// The given text.
-        text: String,
-    },
-    /// The step points away from the end of the range.
-    #[error("'{text}' is empty: step {step} leads away from {to}; start at {from} with step {}", -step)]
-    WrongWay {
-        /// The given text.
-        text: String,
-        /// First value.
-        from: f64,
-        /// Last value.
-        to: f64,
-        /// The step.
-        step: f64,
-    },
-    /// The grid has too many values.
-    #[error("'{text}' has {count:e} values; at most {MOST_VALUES:e} are allowed")]
-    TooMany {
-        /// The given text.
-        text: String,
-        /// Number of values.
-        count: f64,
-    },
-}
-
 impl Grid {
     /// The values, in order.
     pub fn values(&self) -> &[f64] {
@@ -87,25 +30,24 @@ impl Grid {
         }
     }
 
-    fn range(text: &str, from: f64, to: f64, step: f64) -> Result<Self, GridError> {
-        let text = || text.to_owned();
+    fn range(text: &str, from: f64, to: f64, step: f64) -> Result<Self, String> {
         if step == 0.0 {
-            return Err(GridError::ZeroStep { text: text() });
+            return Err(format!(
+                "'{text}' has step 0; give a step that leads from FROM to TO"
+            ));
         }
         let steps = (to - from) / step;
         if steps < 0.0 {
-            return Err(GridError::WrongWay {
-                text: text(),
-                from,
-                to,
-                step,
-            });
+            return Err(format!(
+                "'{text}' is empty: step {step} leads away from {to}; start at {from} with step {}",
+                -step
+            ));
         }
         if steps >= MOST_VALUES {
-            return Err(GridError::TooMany {
-                text: text(),
-                count: steps + 1.0,
-            });
+            let count = steps + 1.0;
+            return Err(format!(
+                "'{text}' has {count:e} values; at most {MOST_VALUES:e} are allowed"
+            ));
         }
         // Multiples of a decimal step are rounded to decimals: 3 · 0.1 is 0.3.
         let decimals = decimals(from).max(decimals(step));
@@ -120,29 +62,30 @@ impl Grid {
 }
 
 impl FromStr for Grid {
-    type Err = GridError;
+    type Err = String;
 
-    fn from_str(text: &str) -> Result<Self, GridError> {
+    fn from_str(text: &str) -> Result<Self, String> {
         if text.trim().is_empty() {
-            return Err(GridError::Empty { text: text.into() });
+            return Err(format!(
+                "'{text}' holds no values; give FROM:TO:STEP or a list, for example 0.4,0.6"
+            ));
         }
         let separator = if text.contains(':') { ':' } else { ',' };
         let values = text
             .split(separator)
             .map(|part| match part.trim().parse::<f64>() {
                 Ok(value) if value.abs() <= LARGEST => Ok(value + 0.0),
-                _ => Err(GridError::NotFinite {
-                    text: text.into(),
-                    part: part.into(),
-                }),
+                _ => Err(format!(
+                    "'{part}' in '{text}' is not a number from -{LARGEST:e} to {LARGEST:e}; give FROM:TO:STEP or a list a,b,c"
+                )),
             })
             .collect::<Result<Vec<_>, _>>()?;
         match (separator, values.as_slice()) {
             (':', &[from, to, step]) => Self::range(text, from, to, step),
-            (':', parts) => Err(GridError::Parts {
-                text: text.into(),
-                parts: parts.len(),
-            }),
+            (':', parts) => Err(format!(
+                "'{text}' has {} parts; a range has three, FROM:TO:STEP, for example -1:-0.1:0.005",
+                parts.len()
+            )),
             _ => Ok(Self {
                 values: once(&values),
             }),
@@ -224,7 +167,7 @@ mod tests {
             ("-0.1:-1:0.005", "step 0.005 leads away from -1"),
             ("0:1:1e-9", "at most 1e6"),
         ] {
-            let message = text.parse::<Grid>().unwrap_err().to_string();
+            let message = text.parse::<Grid>().unwrap_err();
             assert!(message.contains(part), "{message}");
         }
     }

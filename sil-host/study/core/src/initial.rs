@@ -30,37 +30,6 @@ pub struct Initials(Vec<Initial>);
 /// Largest number of random initial conditions per cell.
 const MOST_RANDOM: u32 = 1_000_000;
 
-/// Why a text is not a list of initial conditions.
-#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum InitialError {
-    /// A part is not an initial condition.
-    #[error(
-        "'{part}' in '{text}' is not an initial condition; give a, d, u or random:N, for example a,d,random:3"
-    )]
-    Unknown {
-        /// The given text.
-        text: String,
-        /// The invalid part.
-        part: String,
-    },
-    /// The number of random initial conditions is out of range.
-    #[error("'{part}' in '{text}': the number must be from 1 to {MOST_RANDOM}")]
-    Number {
-        /// The given text.
-        text: String,
-        /// The invalid part.
-        part: String,
-    },
-    /// An initial condition is given twice.
-    #[error("'{part}' appears twice in '{text}'; give every initial condition once")]
-    Twice {
-        /// The given text.
-        text: String,
-        /// The repeated part.
-        part: String,
-    },
-}
-
 impl Initials {
     /// The initial conditions in order; at least one.
     pub fn list(&self) -> &[Initial] {
@@ -69,39 +38,33 @@ impl Initials {
 }
 
 impl core::str::FromStr for Initials {
-    type Err = InitialError;
+    type Err = String;
 
-    fn from_str(text: &str) -> Result<Self, InitialError> {
+    fn from_str(text: &str) -> Result<Self, String> {
         let mut list: Vec<Initial> = Vec::new();
         for part in text.split(',').map(str::trim) {
-            let (text, part) = (|| text.to_owned(), || part.to_owned());
-            let more: Vec<Initial> = match part().split_once(':') {
-                Some(("random", number)) => match number.parse() {
+            let more: Vec<Initial> = match (part, part.split_once(':')) {
+                (_, Some(("random", number))) => match number.parse() {
                     Ok(number @ 1..=MOST_RANDOM) => (1..=number).map(Initial::Random).collect(),
                     _ => {
-                        return Err(InitialError::Number {
-                            text: text(),
-                            part: part(),
-                        });
+                        return Err(format!(
+                            "'{part}' in '{text}': the number must be from 1 to {MOST_RANDOM}"
+                        ));
                     }
                 },
-                _ => vec![match part().as_str() {
-                    "a" => Initial::A,
-                    "d" => Initial::D,
-                    "u" => Initial::U,
-                    _ => {
-                        return Err(InitialError::Unknown {
-                            text: text(),
-                            part: part(),
-                        });
-                    }
-                }],
+                ("a", _) => vec![Initial::A],
+                ("d", _) => vec![Initial::D],
+                ("u", _) => vec![Initial::U],
+                _ => {
+                    return Err(format!(
+                        "'{part}' in '{text}' is not an initial condition; give a, d, u or random:N, for example a,d,random:3"
+                    ));
+                }
             };
             if more.first().is_some_and(|first| list.contains(first)) {
-                return Err(InitialError::Twice {
-                    text: text(),
-                    part: part(),
-                });
+                return Err(format!(
+                    "'{part}' appears twice in '{text}'; give every initial condition once"
+                ));
             }
             list.extend(more);
         }
@@ -209,7 +172,7 @@ mod tests {
             ("a,d,a", "'a' appears twice"),
             ("random:2,random:3", "'random:3' appears twice"),
         ] {
-            let message = text.parse::<Initials>().unwrap_err().to_string();
+            let message = text.parse::<Initials>().unwrap_err();
             assert!(message.contains(part), "{message}");
         }
     }

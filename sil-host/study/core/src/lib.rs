@@ -30,7 +30,7 @@ use painleve_plant::scenario::ScenarioError;
 use painleve_shared::range::OutOfRange;
 use rayon::prelude::*;
 
-pub use grid::{Grid, GridError};
+pub use grid::Grid;
 pub use outcome::Outcome;
 
 /// Why a study has no outcome.
@@ -40,8 +40,8 @@ pub enum StudyError {
     #[error(transparent)]
     Scenario(#[from] ScenarioError),
     /// The text of a grid is invalid.
-    #[error(transparent)]
-    Grid(#[from] GridError),
+    #[error("{0}")]
+    Grid(String),
     /// An override sets a key that the study sets or does not use, or an option names what it cannot compute.
     #[error("{key} has no effect here; {instead}")]
     Taken {

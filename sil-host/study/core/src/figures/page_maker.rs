@@ -80,7 +80,11 @@ impl PageMaker<'_> {
     /// # Errors
     /// [`StudyError`] if the grid is invalid.
     pub fn values(&self, grid: &str) -> Result<Vec<f64>, StudyError> {
-        Ok(grid.parse::<Grid>()?.values().to_vec())
+        Ok(grid
+            .parse::<Grid>()
+            .map_err(StudyError::Grid)?
+            .values()
+            .to_vec())
     }
 }
 

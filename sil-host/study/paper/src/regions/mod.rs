@@ -65,8 +65,6 @@ pub struct Regions {
     pub maps: Vec<Map>,
     #[serde(skip)]
     arm: ArmParameters<f64>,
-    #[serde(skip)]
-    spring_rest_deg: f64,
 }
 
 /// One map of the solution modes.
@@ -109,15 +107,6 @@ pub struct RegionCell {
     mode: SolutionMode,
 }
 
-/// The columns of a map.
-struct Columns {
-    arm: Arm<f64>,
-    /// Largest |θ1| with the tip on the belt, rad.
-    reach_rad: f64,
-    /// Values of θ1 (cell centres) within reach, degrees.
-    theta1_deg: Vec<f64>,
-}
-
 impl RegionsStudy {
     /// Checks the settings.
     ///
@@ -126,7 +115,9 @@ impl RegionsStudy {
     /// [`StudyError::OffTheBelt`] if no θ1 of the grid reaches the belt.
     pub fn check(&self) -> Result<(), StudyError> {
         range::check("--mu", self.mu, 0.0, 10.0)?;
-        self.columns().map(|_| ())
+        self.columns()?;
+        Arm::new(self.arm)?;
+        Ok(())
     }
 
     fn reach_rad(&self) -> f64 {
@@ -136,7 +127,8 @@ impl RegionsStudy {
         libm::acos(cosine.clamp(-1.0, 1.0))
     }
 
-    fn columns(&self) -> Result<Columns, StudyError> {
+    /// Returns the values of θ1 within reach, degrees.
+    fn columns(&self) -> Result<Vec<f64>, StudyError> {
         let reach_rad = self.reach_rad();
         let all = self.theta1_deg.values().iter().copied();
         let theta1_deg: Vec<f64> = all
@@ -147,11 +139,7 @@ impl RegionsStudy {
                 below_deg: reach_rad.to_degrees(),
             });
         }
-        Ok(Columns {
-            arm: Arm::new(self.arm)?,
-            reach_rad,
-            theta1_deg,
-        })
+        Ok(theta1_deg)
     }
 }
 
@@ -166,13 +154,8 @@ impl Study for RegionsStudy {
     fn row(&self, index: usize) -> Result<Map, StudyError> {
         let theta2 = self.theta2[index / self.slips.len()];
         let slip = self.slips[index % self.slips.len()];
-        let columns = self.columns()?;
-        let Columns {
-            arm,
-            reach_rad,
-            theta1_deg,
-        } = &columns;
-        Ok(map(arm, self, theta1_deg, *reach_rad, theta2, slip))
+        let arm = Arm::new(self.arm)?;
+        Ok(map(&arm, self, &self.columns()?, theta2, slip))
     }
 }
 
@@ -184,7 +167,6 @@ impl Regions {
             reach_deg: settings.reach_rad().to_degrees(),
             maps,
             arm: settings.arm,
-            spring_rest_deg: settings.arm.spring_rest_rad[1].to_degrees().abs(),
         }
     }
 }
@@ -193,7 +175,6 @@ fn map(
     arm: &Arm<f64>,
     settings: &RegionsStudy,
     theta1_deg: &[f64],
-    reach: f64,
     theta2: Theta2,
     slip: Slip,
 ) -> Map {
@@ -228,20 +209,13 @@ fn map(
         theta2,
         slip,
         p_zero_theta1_deg: zeros_of_p(arm, mu, theta2, slip),
-        b_zero: zeros_of_b(arm, reach, theta2),
+        b_zero: zeros_of_b(arm, settings.reach_rad(), theta2),
         sliding: part(SolutionMode::Sliding),
         flight: part(SolutionMode::Flight),
         indeterminate: part(SolutionMode::Indeterminate),
         inconsistent: part(SolutionMode::Inconsistent),
         cells,
         grid: (theta1_deg.to_vec(), rates.to_vec()),
-    }
-}
-
-impl Regions {
-    /// Returns the angle of joint 2 from the straight arm at which its spring is relaxed, degrees.
-    pub fn spring_rest_deg(&self) -> f64 {
-        self.spring_rest_deg
     }
 }
 

@@ -18,8 +18,8 @@ pub fn sections(page: &PageMaker<'_>) -> Result<Vec<PageSection>, StudyError> {
     let settings = RegionsStudy {
         arm: PlantParameters::default().arm,
         mu: printed::FRICTION,
-        theta1_deg: "-37:37:0.5".parse()?,
-        theta1_dot_rad_s: "-8:8:0.2".parse()?,
+        theta1_deg: "-37:37:0.5".parse().map_err(StudyError::Grid)?,
+        theta1_dot_rad_s: "-8:8:0.2".parse().map_err(StudyError::Grid)?,
         theta2: vec![Theta2::Positive, Theta2::Negative],
         slips: vec![Slip::Positive, Slip::Negative],
     };
@@ -78,7 +78,7 @@ fn figure_3(outcome: &Regions) -> Section {
             "b is not a mirror image, because the spring between the links is at rest {:.2}° off the \
              straight arm: {} of one map is inconsistent, {} of the mirrored one. The paper's text gives \
              no numbers for this figure.",
-            outcome.spring_rest_deg(),
+            outcome.arm.spring_rest_rad[1].to_degrees().abs(),
             percent(one.inconsistent),
             percent(other.inconsistent),
         ));
