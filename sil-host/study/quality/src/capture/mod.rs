@@ -86,15 +86,6 @@ impl Capture {
         scenario.run.seed = generator.random::<u64>() >> 1;
         Ok(scenario.with_overrides("capture", &self.overrides)?)
     }
-
-    /// Builds the first run, so that an invalid override is reported before any run starts.
-    ///
-    /// # Errors
-    /// [`StudyError`] if it cannot be built.
-    pub fn check(&self) -> Result<(), StudyError> {
-        Trial::new(&self.scenario(0)?)?;
-        Ok(())
-    }
 }
 
 impl Study for Capture {

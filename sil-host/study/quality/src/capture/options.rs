@@ -4,6 +4,7 @@ use clap::Args;
 use painleve_study_core::StudyError;
 use painleve_study_core::catalogue::{InShards, StudyOptions, in_shards};
 use painleve_study_core::options::RandomRuns;
+use painleve_study_core::trial::Trial;
 
 use super::{Capture, Captures, Row};
 
@@ -28,7 +29,8 @@ impl StudyOptions for Options {
             runs: self.runs.runs,
             overrides: self.runs.overrides(),
         };
-        study.check()?;
+        // An invalid override is reported before any run starts.
+        Trial::new(&study.scenario(0)?)?;
         Ok(study)
     }
 

@@ -152,15 +152,6 @@ impl LiftOff {
         scenario.initial = case::at_rest_on_belt(&arm, start_m, posture)?;
         Ok(scenario.with_overrides("lift-off", &self.overrides)?)
     }
-
-    /// Builds the first run, so that an invalid override is reported before any run starts.
-    ///
-    /// # Errors
-    /// [`StudyError`] if it cannot be built.
-    pub fn check(&self) -> Result<(), StudyError> {
-        Trial::new(&self.scenario(0)?)?;
-        Ok(())
-    }
 }
 
 impl Study for LiftOff {

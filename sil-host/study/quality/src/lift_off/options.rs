@@ -4,6 +4,7 @@ use clap::Args;
 use painleve_study_core::StudyError;
 use painleve_study_core::catalogue::{InShards, StudyOptions, in_shards};
 use painleve_study_core::options::{self, RandomRuns};
+use painleve_study_core::trial::Trial;
 
 use super::{LiftOff, LiftOffs, Row};
 
@@ -39,7 +40,8 @@ impl StudyOptions for Options {
             slide_s: self.slide_s,
             overrides: self.runs.overrides(),
         };
-        study.check()?;
+        // An invalid override is reported before any run starts.
+        Trial::new(&study.scenario(0)?)?;
         Ok(study)
     }
 

@@ -22,7 +22,6 @@ use painleve_plant::mechanics::BuiltInPlant;
 use painleve_plant::scenario::Scenario;
 use painleve_study_core::loop_study::{LoopStudy, MakePlant};
 use painleve_study_core::tabular::Tabular;
-use painleve_study_core::trial::Trial;
 use painleve_study_core::{Study, StudyError};
 
 pub use arms::Arms;
@@ -58,15 +57,6 @@ impl Robustness {
     pub fn scenario(&self, index: usize) -> Result<Scenario, StudyError> {
         let scenario = scenario(self.arms, self.seed, index as u64)?;
         Ok(scenario.with_overrides("robustness campaign", &self.overrides)?)
-    }
-
-    /// Builds the first run, so that an invalid override is reported before any run starts.
-    ///
-    /// # Errors
-    /// [`StudyError`] if it cannot be built.
-    pub fn check(&self) -> Result<(), StudyError> {
-        Trial::new(&self.scenario(0)?)?;
-        Ok(())
     }
 }
 

@@ -5,6 +5,7 @@ use painleve_study_core::StudyError;
 use painleve_study_core::catalogue::{InShards, StudyOptions, in_shards};
 use painleve_study_core::grid::once;
 use painleve_study_core::options::RandomRuns;
+use painleve_study_core::trial::Trial;
 
 use super::{Arms, Criterion, Part, Robustness, RobustnessOutcome, Row};
 
@@ -43,7 +44,8 @@ impl StudyOptions for Options {
                 .chain(self.runs.overrides())
                 .collect(),
         };
-        study.check()?;
+        // An invalid override is reported before any run starts.
+        Trial::new(&study.scenario(0)?)?;
         Ok(study)
     }
 

@@ -7,6 +7,7 @@ use painleve_plant::simulation::Simulation;
 use painleve_shared::ArmParameters;
 use painleve_shared::frame::ActuatorFrame;
 use painleve_shared::status::Fault;
+use painleve_study_core::trial::Trial;
 use painleve_study_core::{Outcome, rows};
 
 use super::*;
@@ -248,7 +249,10 @@ fn a_part_that_is_off_has_no_effect() {
 fn an_invalid_override_is_reported_before_any_run_starts() {
     let mut study = campaign(1);
     study.overrides = vec!["converters.link.frame_loss=2".into()];
-    let error = study.check().unwrap_err().to_string();
+    let first = study
+        .scenario(0)
+        .and_then(|scenario| Ok(Trial::new(&scenario)?));
+    let error = first.err().unwrap().to_string();
     assert!(
         error.contains("frame_loss = 2") && error.contains("0 to 1"),
         "{error}"
