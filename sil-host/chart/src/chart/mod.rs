@@ -22,7 +22,7 @@ const TOP: i32 = 16;
 const GAP: i32 = 28;
 
 /// A figure.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Chart {
     /// Title of the figure.
     pub title: String,
@@ -36,25 +36,10 @@ pub struct Chart {
     pub x_labels: Option<Vec<(f64, String)>>,
     /// Panels from left to right, then from top to bottom.
     pub panels: Vec<Panel>,
-    /// Number of panels side by side.
+    /// Number of panels side by side; zero is one.
     pub columns: usize,
     /// Whether one legend above the panels serves all of them.
     pub one_legend: bool,
-}
-
-impl Default for Chart {
-    fn default() -> Self {
-        Self {
-            title: String::new(),
-            subtitle: String::new(),
-            x_title: String::new(),
-            x: None,
-            x_labels: None,
-            panels: Vec::new(),
-            columns: 1,
-            one_legend: false,
-        }
-    }
 }
 
 /// A panel of a figure.
