@@ -51,18 +51,6 @@ pub enum Regime {
     Undecided,
 }
 
-impl Regime {
-    /// Returns the regime's name, as it is serialised.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Quiet => "quiet",
-            Self::Periodic => "periodic",
-            Self::Chaotic => "chaotic",
-            Self::Undecided => "undecided",
-        }
-    }
-}
-
 /// The regime of an orbit and its evidence.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RegimeVerdict {

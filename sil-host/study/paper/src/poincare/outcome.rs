@@ -113,7 +113,7 @@ impl Outcome for PoincareDiagram {
                 stretch.mu.to_string(),
                 stretch.initial.clone(),
                 format!("{from} … {to}"),
-                stretch.regime.name().to_owned(),
+                outcome::name(&stretch.regime),
                 stretch
                     .period
                     .map_or("–".into(), |period| period.to_string()),
