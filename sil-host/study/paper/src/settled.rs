@@ -73,6 +73,7 @@ mod tests {
     use painleve_plant::ContactMode;
     use painleve_plant::mechanics::PlantParameters;
     use painleve_shared::{Arm, ArmParameters, Posture};
+    use painleve_study_core::belt_line::bisected;
 
     fn plant(parameters: &PlantParameters, theta1_deg: f64, theta2_deg: f64) -> ArmOnBelt {
         let initial = State::new(theta1_deg.to_radians(), theta2_deg.to_radians(), 0.0, 0.0);
@@ -130,17 +131,10 @@ mod tests {
             let motion = plant.motion();
             theta_dot(&motion.derivative(plant.mode(), 0.0, plant.state()))
         };
-        let (mut lower, mut upper) = (-0.1, 0.1);
+        let (lower, upper) = (-0.1, 0.1);
         assert!(slope(&at(lower)).first() < 0.0 && slope(&at(upper)).first() > 0.0);
-        for _ in 0..60 {
-            let middle = 0.5 * (lower + upper);
-            if slope(&at(middle)).first() < 0.0 {
-                lower = middle;
-            } else {
-                upper = middle;
-            }
-        }
-        let plant = at(lower);
+        let between = bisected(lower, upper, |tip_t_m| slope(&at(tip_t_m)).first() < 0.0);
+        let plant = at(between);
         assert!(slope(&plant).amax() < AT_REST, "{:?}", slope(&plant));
         assert!(!has_settled(&plant));
     }
