@@ -126,12 +126,12 @@ impl Tuning {
     /// # Errors
     /// [`StudyError`] if a case cannot be run.
     pub fn score(&self, scenario: &Scenario, cases: usize, seed: u64) -> Result<Score, StudyError> {
-        let all: Vec<Case> = (0..cases)
+        let all: Vec<Score> = (0..cases)
             .map(|index| run(&case(scenario, seed, index as u64), &self.interrupt))
             .collect::<Result<_, _>>()?;
-        let mean = |value: fn(&Case) -> f64| all.iter().map(value).sum::<f64>() / cases as f64;
+        let mean = |value: fn(&Score) -> f64| all.iter().map(value).sum::<f64>() / cases as f64;
         Ok(Score {
-            kept: mean(|case| f64::from(u8::from(case.is_kept))),
+            kept: mean(|case| case.kept),
             error_mm: mean(|case| case.error_mm),
             ripple_n: mean(|case| case.ripple_n),
             torque_change_nm: mean(|case| case.torque_change_nm),
@@ -181,15 +181,6 @@ fn case(scenario: &Scenario, seed: u64, index: u64) -> Scenario {
     case
 }
 
-/// The outcome of one case.
-#[derive(Clone, Copy, Debug)]
-struct Case {
-    is_kept: bool,
-    error_mm: f64,
-    ripple_n: f64,
-    torque_change_nm: f64,
-}
-
 /// Sums the squares of the tracking error.
 #[derive(Default)]
 struct Errors {
@@ -208,7 +199,8 @@ impl Monitor for Errors {
     }
 }
 
-fn run(scenario: &Scenario, interrupt: &Interrupt) -> Result<Case, StudyError> {
+/// Scores one case.
+fn run(scenario: &Scenario, interrupt: &Interrupt) -> Result<Score, StudyError> {
     let host = InProcess::new(&scenario.controller_configuration())?;
     let mut closed_loop = ClosedLoop::new(Simulation::new(scenario)?, host);
     let mut errors = Errors::default();
@@ -226,8 +218,9 @@ fn run(scenario: &Scenario, interrupt: &Interrupt) -> Result<Case, StudyError> {
             .unwrap_or_default()
     };
     let (moving, holding) = (&result.smoothness.moving, &result.smoothness.holding);
-    Ok(Case {
-        is_kept: goes_on && result.statistics.lift_offs == 0 && result.fault.is_none(),
+    let is_kept = goes_on && result.statistics.lift_offs == 0 && result.fault.is_none();
+    Ok(Score {
+        kept: f64::from(u8::from(is_kept)),
         error_mm: 1e3 * (errors.squares_m2 / errors.ticks.max(1) as f64).sqrt(),
         ripple_n: holding.force_ripple_n().unwrap_or_default(),
         torque_change_nm: 0.5 * (change(moving) + change(holding)),
