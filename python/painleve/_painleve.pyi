@@ -1,6 +1,5 @@
 """The compiled part of the package."""
 
-from collections.abc import Mapping
 from typing import Any, TypedDict
 
 class State(TypedDict, total=False):
@@ -93,13 +92,14 @@ class Telemetry(TypedDict, total=False):
     saturated_ticks: int
     """Ticks since the start with limited torque."""
 
-Overrides = Mapping[str, Any]
+Overrides = dict[str, Any]
 Sensor = tuple[int, int, int, int, int, int, int]
 Actuator = tuple[int, int, int, int, int, int, int, int, int]
 
 class Plant:
-    tick_hz: int
     def __init__(self, scenario: str = "hybrid-elbow-down", overrides: Overrides | None = None) -> None: ...
+    @property
+    def tick_hz(self) -> int: ...
     def step(self, u1_nm: float, u2_nm: float) -> State: ...
     def state(self) -> State: ...
 
