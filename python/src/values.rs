@@ -97,18 +97,9 @@ fn toml_value(key: &str, value: &Bound<'_, PyAny>, level: usize) -> PyResult<Val
         Ok(Value::Float(number.value()))
     } else if let Ok(text) = value.cast::<PyString>() {
         Ok(Value::String(text.extract()?))
-    } else if let Ok(items) = value.cast::<PyList>() {
-        items
-            .iter()
-            .map(inner)
-            .collect::<PyResult<_>>()
-            .map(Value::Array)
-    } else if let Ok(items) = value.cast::<PyTuple>() {
-        items
-            .iter()
-            .map(inner)
-            .collect::<PyResult<_>>()
-            .map(Value::Array)
+    } else if value.is_instance_of::<PyList>() || value.is_instance_of::<PyTuple>() {
+        let items = value.try_iter()?.map(|item| inner(item?));
+        items.collect::<PyResult<_>>().map(Value::Array)
     } else if let Ok(table) = value.cast::<PyDict>() {
         let entries = table
             .iter()
