@@ -392,8 +392,9 @@ impl PyController {
 
 /// Computes a study on all cores and returns the object that `painleve study NAME --json` prints.
 ///
-/// Options are those of that command with `_` for `-`: a number or a text, a list or an array for values separated by
-/// commas, True for an option without a value, and for `set` a dictionary of keys or a list of texts `key=value`::
+/// Options are those of that command, except those of its output and `threads`, with `_` for `-`: a number or a text, a list
+/// or an array for values separated by commas, True for an option without a value, and for `set` a dictionary of keys or a list
+/// of texts `key=value`::
 ///
 ///     painleve.study("bifurcation", mu=0.6, v_belt="-0.6:-0.2:0.1", initial=["a", "d"], set={"belt.friction": 0.5})
 #[pyfunction]
