@@ -39,10 +39,13 @@ fn load(scenario: &str, overrides: Option<&Bound<'_, PyDict>>) -> PyResult<Scena
     loaded.map_err(|error| PyValueError::new_err(error.to_string()))
 }
 
-/// Returns the plant of a scenario.
+/// Returns the plant of a scenario at its start.
 fn plant(scenario: &Scenario) -> PyResult<Interruptible> {
-    let plant = BuiltInPlant::new(scenario);
-    plant.map(Interruptible::new).map_err(out_of_range)
+    let mut plant = BuiltInPlant::new(scenario).map_err(out_of_range)?;
+    // Until it first advances, a plant only guesses the mode of a tip on the belt.
+    let decided = plant.advance(0.0, &mut ());
+    decided.map_err(|error| exception(&error))?;
+    Ok(Interruptible::new(plant))
 }
 
 fn out_of_range(error: OutOfRange) -> PyErr {

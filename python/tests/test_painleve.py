@@ -137,6 +137,15 @@ def test_sample_and_advance_alternate():
     assert (sensor[0], simulation.sample()[0][0]) == (0, 1)
 
 
+def test_a_plant_starts_in_the_contact_with_which_a_run_starts():
+    for scenario in ("open-loop-bounce", "hybrid-elbow-down"):
+        run = painleve.run(scenario, {"run.duration_s": 0.01})
+        for state in (painleve.Plant(scenario).state(), painleve.Simulation(scenario).state()):
+            assert state["normal_force_n"] >= 0.0
+            for name in ("mode", "normal_force_n", "theta1_dot_rad_s"):
+                assert state[name] == run[f"plant.{name}"][0]
+
+
 def test_the_plant_falls_off_the_belt_without_control():
     plant = painleve.Plant("open-loop-bounce")
     while plant.state()["time_s"] < 0.2:

@@ -4,6 +4,7 @@
 use std::ffi::c_char;
 
 use painleve_plant::Plant;
+use painleve_plant::mechanics::BuiltInPlant;
 use painleve_plant::simulation::Simulation;
 
 use crate::frames::{PainleveActuatorFrame, PainleveSensorFrame, PainleveSnapshot};
@@ -31,8 +32,11 @@ pub unsafe extern "C" fn painleve_plant_new(
         // SAFETY: guaranteed by this function's contract.
         let scenario = unsafe { scenario(scenario_toml) }?;
         let make = || {
+            let mut plant = BuiltInPlant::new(&scenario)?;
+            // Until it first advances, a plant only guesses the mode of a tip on the belt.
+            plant.advance(0.0, &mut ())?;
             Ok(PainlevePlant {
-                simulation: Simulation::new(&scenario)?,
+                simulation: Simulation::of(plant, &scenario)?,
                 is_sampled: false,
             })
         };

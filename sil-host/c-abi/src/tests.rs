@@ -214,6 +214,26 @@ fn sample_and_advance_alternate() {
 }
 
 #[test]
+fn the_first_sample_changes_neither_contact_nor_force() {
+    // From x0,a the belt throws the tip off, from x0,d it does not.
+    for text in [c"initial = { theta1_deg = 32.0, theta2_deg = 18.27 }", c""] {
+        let plant = new_plant(text);
+        let mut states = [PainleveSnapshot::default(); 2];
+        let (mut sensor, mut lost) = (PainleveSensorFrame::default(), false);
+        // SAFETY: an object and variables of this function.
+        unsafe {
+            assert_eq!(painleve_plant_snapshot(plant, &mut states[0]), Done);
+            assert_eq!(painleve_plant_sample(plant, &mut sensor, &mut lost), Done);
+            assert_eq!(painleve_plant_snapshot(plant, &mut states[1]), Done);
+            painleve_plant_free(plant);
+        }
+        let [before, after] = states.map(|state| (state.contact_mode, state.normal_force_n));
+        assert_eq!(before, after);
+        assert!(before.1 >= 0.0);
+    }
+}
+
+#[test]
 fn any_frame_has_an_answer_without_a_panic() {
     // SAFETY: objects and variables of this function.
     unsafe {
