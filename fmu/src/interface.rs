@@ -11,6 +11,7 @@
 #![allow(non_snake_case)]
 
 use std::ffi::{CStr, CString, c_char, c_void};
+use std::io::Write as _;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::PathBuf;
 use std::ptr::null_mut;
@@ -77,9 +78,14 @@ impl Log {
                     text.as_ptr(),
                 );
             },
-            _ => eprintln!("painleve: {message}"),
+            _ => complain(message),
         }
     }
+}
+
+/// Writes a line to standard error. A simulator may have closed it, and `eprintln!` would then end the process.
+fn complain(message: &str) {
+    let _ = writeln!(std::io::stderr(), "painleve: {message}");
 }
 
 /// Does a call's work if the instance is in one of the states.
@@ -91,7 +97,7 @@ fn call(
 ) -> fmi3Status {
     // SAFETY: null or from `fmi3InstantiateCoSimulation`, not freed and not shared, by the standard.
     let Some(instance) = (unsafe { instance.cast::<Instance>().as_mut() }) else {
-        eprintln!("painleve: {name}: the instance is null");
+        complain(&format!("{name}: the instance is null"));
         return fmi3Status_fmi3Error;
     };
     let result = if !states.contains(&instance.state) {
@@ -299,7 +305,7 @@ unsafe extern "C" fn fmi3InstantiateCoSimulation(
 
 /// Instantiation for another kind of simulation. Its arguments are not looked at.
 fn not_instantiated(name: &str) -> fmi3Instance {
-    eprintln!("painleve: {name}: this FMU is for co-simulation only");
+    complain(&format!("{name}: this FMU is for co-simulation only"));
     null_mut()
 }
 
