@@ -238,6 +238,7 @@ def check_initialization(fmu):
         ("impact.restitution = 2", "impact.restitution", 2.0),
         ("belt.profile.speed_m_s = inf", "belt.speed_m_s", INF),
         ("initial.theta1_deg = NaN", "initial.theta1_deg", NAN),
+        ("u1_nm = NaN", "u1_nm", NAN),
         ("did you mean 'tip_mass_kg'", "settings", b"arm.tip_mas_kg=0.1"),
     ]:
         instance = fmu.in_state("Instantiated")
@@ -245,6 +246,22 @@ def check_initialization(fmu):
         fmu.refused(part, instance, "ExitInitializationMode")
         assert "--set" not in fmu.messages[0]
         fmu.library.fmi3FreeInstance(instance)
+
+
+def check_start(fmu):
+    """The first outputs are those of a plant that has decided its contact, under the torques set before."""
+    names = ("normal_force_n", "contact_mode", "theta1_dot_rad_s")
+    starts = {}
+    for torque_nm in (0.0, 2.0, -2.0):
+        for state in STATES[:3]:
+            instance = fmu.in_state(state, u1_nm=torque_nm)
+            start = [fmu.get(instance, name) for name in names]
+            [force_n, mode, _] = [value for status, value in start if status == OK]
+            assert force_n >= 0.0 and (force_n > 0.0) == (mode != 0), (torque_nm, state, start)
+            assert starts.setdefault(torque_nm, start) == start, (torque_nm, state)
+            fmu.library.fmi3FreeInstance(instance)
+    # One torque lifts the tip, the other presses it on the belt, which throws it off.
+    assert starts[2.0] != starts[-2.0], "torques set before the start change nothing"
 
 
 def check_steps(fmu):
@@ -328,5 +345,5 @@ def check_reset(fmu):
 
 def check(folder, description):
     fmu = Fmu(folder, description)
-    for part in (check_instantiation, check_states, check_variables, check_initialization, check_steps, check_reset):
+    for part in (check_instantiation, check_states, check_variables, check_initialization, check_start, check_steps, check_reset):
         part(fmu)

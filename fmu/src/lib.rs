@@ -111,7 +111,17 @@ impl ArmOnBelt {
         arm
     }
 
-    /// Returns the plant of the present parameters, at rest in its initial posture.
+    /// Returns the torques of the inputs.
+    fn torque_nm(&self) -> Result<JointTorque<f64>, Failure> {
+        let (u1_nm, u2_nm) = (self.u1_nm, self.u2_nm);
+        if !(u1_nm.is_finite() && u2_nm.is_finite()) {
+            let torques = format!("u1_nm = {u1_nm}, u2_nm = {u2_nm}");
+            return Err(format!("{torques}: torques are finite numbers").into());
+        }
+        Ok(JointTorque::new(u1_nm, u2_nm))
+    }
+
+    /// Returns the plant of the present parameters and inputs, in its initial posture.
     fn new_plant(&self) -> Result<BuiltInPlant, Failure> {
         let mut overrides: Vec<String> = self.settings.lines().map(str::to_owned).collect();
         overrides.retain(|line| !line.trim().is_empty());
@@ -128,7 +138,11 @@ impl ArmOnBelt {
             format!("initial.theta2_deg={}", number(self.initial_theta2_deg)),
         ]);
         let scenario = Scenario::load(SCENARIO, &overrides)?;
-        Ok(BuiltInPlant::new(&scenario)?)
+        let mut plant = BuiltInPlant::new(&scenario)?;
+        plant.command_torque(self.torque_nm()?, 0.0);
+        // Until it first advances, a plant only guesses the mode of a tip on the belt.
+        plant.advance(0.0, &mut ())?;
+        Ok(plant)
     }
 
     /// Sets the time at which the simulation starts and the one at which it must have ended, s.
@@ -149,14 +163,14 @@ impl ArmOnBelt {
         Ok(())
     }
 
-    /// Shows what a plant of the present parameters would be.
+    /// Shows what a plant of the present parameters and inputs would be.
     fn show_start(&mut self) -> Result<(), Failure> {
         let plant = self.new_plant()?;
         self.show(&plant.snapshot());
         Ok(())
     }
 
-    /// Starts the plant of the present parameters.
+    /// Starts the plant of the present parameters and inputs.
     fn start(&mut self) -> Result<(), Failure> {
         let plant = self.new_plant()?;
         self.show(&plant.snapshot());
@@ -191,11 +205,7 @@ impl ArmOnBelt {
         {
             return Err(format!("the step ends at {until_s} s, after stopTime = {stop_s}").into());
         }
-        let torque_nm = JointTorque::new(self.u1_nm, self.u2_nm);
-        if !(self.u1_nm.is_finite() && self.u2_nm.is_finite()) {
-            let torques = format!("u1_nm = {}, u2_nm = {}", self.u1_nm, self.u2_nm);
-            return Err(format!("{torques}: torques are finite numbers").into());
-        }
+        let torque_nm = self.torque_nm()?;
         let plant = self.plant.as_mut().ok_or("there is no plant")?;
         plant.command_torque(torque_nm, 0.0);
         let advanced = plant.advance(until_s - start_s, &mut ());
