@@ -304,6 +304,14 @@ def check_steps(fmu):
     for tick in range(3):
         assert fmu.call(instance, "DoStep", 1e3 + tick * 0.1, 0.1 + 1e-12, True, None, None, None, None) == OK
     fmu.library.fmi3FreeInstance(instance)
+    # However late it is, no step is skipped and none goes beyond the end.
+    late_s, step_s = 1.7e9, 1.0 / 1024.0
+    for part, skipped in [("currentCommunicationPoint", 2), ("after stopTime", 1)]:
+        instance = fmu.in_state("Instantiated")
+        assert fmu.enter(instance, late_s, late_s + 1.5 * step_s) == OK and fmu.call(instance, "ExitInitializationMode") == OK
+        assert fmu.step(instance, late_s, step_s)[0] == OK
+        fmu.refused(part, instance, "DoStep", late_s + skipped * step_s, step_s, True, None, None, None, None)
+        fmu.library.fmi3FreeInstance(instance)
     print(f"{len(bad)} bad steps are refused")
 
 

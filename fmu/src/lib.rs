@@ -17,7 +17,7 @@ const SCENARIO: &str = "open-loop-bounce";
 /// Longest communication step, s: some seconds of computation.
 const LONGEST_STEP_S: f64 = 3600.0;
 /// Largest difference of a communication point from the plant's own time, and of the end from the stop time, as a part
-/// of either: simulators add up their steps in several ways.
+/// of either, and at most a tenth of the step: simulators add up their steps in several ways.
 const TIME_TOLERANCE: f64 = 1e-9;
 
 /// Why a call fails, in one sentence.
@@ -190,8 +190,8 @@ impl ArmOnBelt {
             let limit = format!("a step is above 0 s and at most {LONGEST_STEP_S} s");
             return Err(format!("communicationStepSize = {step_s}: {limit}").into());
         }
-        let tolerance_s = TIME_TOLERANCE * now_s.abs().max(1.0);
-        let is_at_point = (point_s - now_s).abs() <= tolerance_s.min(step_s);
+        let tolerance_s = |time_s: f64| (TIME_TOLERANCE * time_s.abs().max(1.0)).min(0.1 * step_s);
+        let is_at_point = (point_s - now_s).abs() <= tolerance_s(now_s);
         if !is_at_point {
             let expected = format!("the plant is at {now_s} s");
             return Err(format!("currentCommunicationPoint = {point_s}: {expected}").into());
@@ -201,7 +201,7 @@ impl ArmOnBelt {
             return Err(format!("communicationStepSize = {step_s} is lost in {point_s} s").into());
         }
         if let Some(stop_s) = stop_s
-            && until_s > stop_s + TIME_TOLERANCE * stop_s.abs().max(1.0)
+            && until_s > stop_s + tolerance_s(stop_s)
         {
             return Err(format!("the step ends at {until_s} s, after stopTime = {stop_s}").into());
         }
