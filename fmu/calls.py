@@ -240,6 +240,11 @@ def check_initialization(fmu):
         ("initial.theta1_deg = NaN", "initial.theta1_deg", NAN),
         ("u1_nm = NaN", "u1_nm", NAN),
         ("did you mean 'tip_mass_kg'", "settings", b"arm.tip_mas_kg=0.1"),
+        ("belt.friction is decided by the parameter belt.friction", "settings", b"run.seed=3\nbelt.friction = 0.5"),
+        ("belt.profile.speed_m_s is decided by the parameter belt.speed_m_s", "settings", b"belt.profile.speed_m_s=-0.5"),
+        ("impact.restitution is decided by", "settings", b"impact={ restitution = 0.2 }"),
+        ("initial.theta2_deg is decided by", "settings", b"initial.theta2_deg=18"),
+        ("initial.tip_m is decided by the parameter initial.theta1_deg", "settings", b"initial.tip_m=0.05"),
     ]:
         instance = fmu.in_state("Instantiated")
         assert fmu.set(instance, name, value) == OK and fmu.enter(instance) == OK

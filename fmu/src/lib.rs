@@ -7,12 +7,23 @@ mod interface;
 use fmi_export::FmuModel;
 use fmi_export::fmi3::Model;
 use painleve_plant::mechanics::BuiltInPlant;
-use painleve_plant::scenario::Scenario;
+use painleve_plant::scenario::{Scenario, sets};
 use painleve_plant::{Plant, Snapshot};
 use painleve_shared::JointTorque;
 
 /// The scenario whose settings the parameters change.
 const SCENARIO: &str = "open-loop-bounce";
+
+/// Keys of a scenario that a parameter decides, which would overwrite them without a word.
+const OWN_PARAMETERS: [(&str, &str); 7] = [
+    ("belt.friction", "belt.friction"),
+    ("belt.profile", "belt.speed_m_s"),
+    ("impact.restitution", "impact.restitution"),
+    ("initial.theta1_deg", "initial.theta1_deg"),
+    ("initial.theta2_deg", "initial.theta2_deg"),
+    ("initial.tip_m", "initial.theta1_deg"),
+    ("initial.elbow", "initial.theta1_deg"),
+];
 
 /// Longest communication step, s: some seconds of computation.
 const LONGEST_STEP_S: f64 = 3600.0;
@@ -31,7 +42,7 @@ type Failure = Box<dyn std::error::Error>;
     co_simulation = true
 )]
 struct ArmOnBelt {
-    /// Settings of the plant, one `key=value` per line as after `painleve run --set`; the other parameters are applied after them
+    /// Settings of the plant, one `key=value` per line as after `painleve run --set`; keys of the other parameters are refused
     #[variable(name = "settings", causality = Parameter, variability = Fixed, start = String::new(), initial = Exact)]
     settings: String,
     /// Friction coefficient between tip and belt
@@ -125,6 +136,13 @@ impl ArmOnBelt {
     fn new_plant(&self) -> Result<BuiltInPlant, Failure> {
         let mut overrides: Vec<String> = self.settings.lines().map(str::to_owned).collect();
         overrides.retain(|line| !line.trim().is_empty());
+        for setting in &overrides {
+            let taken = |(key, parameter)| Some((sets(setting, key)?, parameter));
+            if let Some((key, parameter)) = OWN_PARAMETERS.into_iter().find_map(taken) {
+                let decided = format!("{key} is decided by the parameter {parameter}");
+                return Err(format!("settings: {decided}").into());
+            }
+        }
         // TOML writes nan where Rust writes NaN; the scenario then names the range.
         let number = |value: f64| format!("{value:?}").to_lowercase();
         overrides.extend([
