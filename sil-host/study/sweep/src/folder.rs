@@ -1,6 +1,6 @@
 //! The folder of a sweep: its finished shards and their merge.
 
-use std::fs;
+use std::fs::{self, File};
 use std::path::{Path, PathBuf};
 
 use serde::{Serialize, Serializer};
@@ -223,7 +223,10 @@ pub fn tidy(folder: &Path) {
     for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
         let name = entry.file_name();
         let name = name.to_string_lossy();
-        if name.starts_with(".shard-") && name.ends_with(".part") {
+        let is_file = entry.file_type().is_ok_and(|kind| kind.is_file());
+        // One that is locked is being written, by a process that computes a shard twice.
+        let is_dead = || File::open(entry.path()).is_ok_and(|file| file.try_lock().is_ok());
+        if name.starts_with(".shard-") && name.ends_with(".part") && is_file && is_dead() {
             // A file that cannot be removed is harmless.
             let _ = fs::remove_file(entry.path());
         }
@@ -319,12 +322,14 @@ mod tests {
         for name in [".shard-1.csv.x.part", "shard-1.csv", "mine.part"] {
             fs::write(folder.path().join(name), "").unwrap();
         }
+        let written = File::create(folder.path().join(".shard-2.csv.y.part")).unwrap();
+        written.lock().unwrap();
         tidy(folder.path());
         let mut left: Vec<_> = fs::read_dir(folder.path())
             .unwrap()
             .map(|entry| entry.unwrap().file_name().into_string().unwrap())
             .collect();
         left.sort();
-        assert_eq!(left, ["mine.part", "shard-1.csv"]);
+        assert_eq!(left, [".shard-2.csv.y.part", "mine.part", "shard-1.csv"]);
     }
 }
