@@ -7,7 +7,7 @@ use painleve_shared::LinkMotion;
 use serde_json::{Value, json};
 
 use crate::events::Totals;
-use crate::page::{LISTED_EVENTS, description, html};
+use crate::page::{LISTED_EVENTS, arm, description, html};
 use crate::row::{Follower, ROW_BYTES, Row};
 use crate::thinning::Thinned;
 
@@ -22,7 +22,7 @@ pub fn comparison_html(
     let mut page = description(scenario);
     let mut encoded = runs
         .iter()
-        .map(|run| BASE64.encode(&rows(run, run.scenario.as_ref().unwrap_or(scenario))));
+        .map(|run| BASE64.encode(&rows(run, scenario_of(run, scenario))));
     page["rows"] = encoded.next().into();
     let (listed, totals) = runs.first().map(events).unwrap_or_default();
     page["events"] = listed.into();
@@ -33,11 +33,16 @@ pub fn comparison_html(
         "aligned": format!("Aligned at {}", comparison.alignment),
         "others": others.map(|((number, run), rows)| json!({
             "label": run.label, "shift_s": comparison.shift_s(number), "rows": rows,
-            "arm": description(run.scenario.as_ref().unwrap_or(scenario))["arm"],
+            "arm": arm(scenario_of(run, scenario)),
         })).collect::<Vec<_>>(),
         "tables": tables(runs, outcomes, differences),
     });
     html(&page)
+}
+
+/// Returns the settings of a run; those of the first if they are not known.
+fn scenario_of<'a>(run: &'a Run, first: &'a Scenario) -> &'a Scenario {
+    run.scenario.as_ref().unwrap_or(first)
 }
 
 /// Returns the rows of a run.

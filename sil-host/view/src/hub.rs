@@ -67,7 +67,7 @@ fn add(queue: &mut VecDeque<String>, texts: &[String]) {
 #[derive(Debug, Default)]
 pub(crate) struct ClientQueue {
     /// Whether it has subscribed to any channel.
-    is_subscribed: bool,
+    pub(crate) is_subscribed: bool,
     entries: VecDeque<Entry>,
 }
 
@@ -205,11 +205,6 @@ impl Hub {
     pub(crate) fn send(&self, entries: &[Entry]) {
         self.clients
             .each(|queue| entries.iter().for_each(|entry| queue.push(entry)));
-    }
-
-    /// Sets whether a client has subscribed to any channel.
-    pub(crate) fn set_subscribed(&self, queue: &Mutex<ClientQueue>, is_subscribed: bool) {
-        locked(queue).is_subscribed = is_subscribed;
     }
 }
 

@@ -52,13 +52,18 @@ pub fn description(scenario: &Scenario) -> Value {
         "tick_hz": scenario.run.tick_hz,
         "friction": scenario.belt.friction,
         "seed": scenario.run.seed,
-        "arm": {
-            "link_length_m": scenario.arm.link_length_m,
-            "height_m": scenario.arm.height_m,
-        },
+        "arm": arm(scenario),
         "settings": scenario.to_toml().unwrap_or_default(),
         "columns": COLUMNS,
         "byte_columns": BYTE_COLUMNS,
+    })
+}
+
+/// Returns what the page draws an arm from.
+pub fn arm(scenario: &Scenario) -> Value {
+    json!({
+        "link_length_m": scenario.arm.link_length_m,
+        "height_m": scenario.arm.height_m,
     })
 }
 

@@ -200,8 +200,8 @@ impl Client<'_> {
     }
 
     fn update_subscriptions(&self) {
-        self.hub
-            .set_subscribed(self.queue, self.subscriptions.iter().any(Option::is_some));
+        let is_subscribed = self.subscriptions.iter().any(Option::is_some);
+        locked(self.queue).is_subscribed = is_subscribed;
     }
 
     /// Sends the parameters with these names; all if there are none.
