@@ -95,3 +95,17 @@ fn enable_arms_lapses_stop_and_reset_then_a_new_enable_start_again() {
         faulty(Fault::LostFrames)
     );
 }
+
+#[test]
+fn state_and_settings_are_small() {
+    assert!(size_of::<ControlTask<Arm>>() <= 2048);
+    assert!(size_of::<Configuration>() <= 1024);
+}
+
+#[test]
+fn the_firmware_has_less_than_80_lines_of_code() {
+    let is_code = |line: &&str| !line.trim().is_empty() && !line.trim().starts_with("//");
+    let files = [include_str!("lib.rs"), include_str!("main.rs")];
+    let lines = files.map(|file| file.lines().filter(is_code).count());
+    assert!(lines[0] + lines[1] < 80, "{lines:?}");
+}
