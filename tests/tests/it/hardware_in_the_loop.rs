@@ -70,6 +70,32 @@ fn course(report: &Value) -> Vec<&Value> {
     .into()
 }
 
+/// QEMU answers for the image and the processor, but has no register that names the chip.
+#[test]
+fn a_board_whose_chip_is_unknown_is_not_accepted() {
+    let bench = Bench::new("accept");
+    let line = SerialLine::new(LineNoise::None);
+    let _board = line.start_board();
+    let port = line.host_port.to_string_lossy();
+    let output = bench.run(&["accept", "--port", &port, "--json"]);
+    assert_eq!(output.status.code(), Some(1));
+    let report: Value = serde_json::from_slice(&output.stdout).expect("JSON");
+    let steps = report["steps"].as_array().expect("steps");
+    let checks = steps[0]["checks"].as_array().expect("checks");
+    let found: Vec<_> = checks
+        .iter()
+        .map(|check| (check["what"].as_str(), check["verdict"].as_str()))
+        .map(|(what, verdict)| (what.unwrap_or(""), verdict.unwrap_or("")))
+        .collect();
+    let expected = [
+        ("sources of the image", "passed"),
+        ("processor", "passed"),
+        ("device number", "failed"),
+        ("revision, for the errata sheet", "noted"),
+    ];
+    assert_eq!((steps.len(), &found[..]), (1, &expected[..]), "{report}");
+}
+
 #[test]
 fn a_run_over_the_line_is_the_native_run() {
     let bench = Bench::new("serial");

@@ -230,6 +230,24 @@ fn runs_as_processes_agree_and_repeat_to_the_instruction() {
     assert_eq!(timings[0], timings[2]);
 }
 
+/// Whole, as a user runs them. At 10 kHz, as `paper-gains` asks for, the emulator is slower than real time.
+#[test]
+#[ignore = "measures time, so it needs a quiet machine"]
+fn every_built_in_scenario_runs_as_natively_and_at_1_khz_three_times_as_fast_as_real_time() {
+    let bench = Bench::new("qemu-speed");
+    let image = image().to_string_lossy();
+    for name in built_in::names() {
+        let native = bench.report(&[&["run", name], &QUIET[..]].concat());
+        let qemu = ["run", name, "--host", "qemu", "--elf", &image];
+        let report = bench.report(&[&qemu[..], &QUIET[..]].concat());
+        assert_eq!(report["log_hash"], native["log_hash"], "{name}");
+        let factor = report["realtime_factor"].as_f64().unwrap();
+        println!("{name}: {factor:.1} × real time");
+        let is_slow = Scenario::load(name, &[]).unwrap().run.tick_hz <= 1000;
+        assert!(factor >= 3.0 || !is_slow, "{name}: {factor}");
+    }
+}
+
 #[test]
 fn timing_gives_the_same_report_for_every_host() {
     let bench = Bench::new("timing");

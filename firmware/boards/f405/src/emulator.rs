@@ -1,7 +1,7 @@
 //! This image under QEMU, whose `netduinoplus2` has this chip: the very bytes that are flashed.
 //!
 //! QEMU 7.2 models the timers, the serial port and the SPI, but not the following. What the image then does is decided at
-//! its start, by what the registers say:
+//! its start, by what the registers say, and not when it is built: what is tested here is then what is flashed.
 //!
 //! | not modelled | sign | the image |
 //! |---|---|---|
@@ -10,6 +10,7 @@
 //! | DMA | a number stored in its register is not there | moves bytes in the port's interrupt (`uart_dma`) |
 //! | mapping of memory | – | finds the program at 0x400 of the flash as well (`memory.x`) |
 //! | flash registers, watchdogs, converter, pins | – | goes on: they read 0 |
+//! | erased flash, which reads 0 instead of 0xff | – | finds no stored configuration |
 //!
 //! With descriptors 100 and 101 for the emulator, the link is semihosting on these two pipes. The virtual clock stands still
 //! during a semihosting call, so that a run under `-icount` is deterministic to the instruction, however long the
