@@ -35,6 +35,7 @@ pub enum Defect {
     OscillatorTooFast,
     FlashBitStuck,
     ErasesBothSlots,
+    LogDead,
 }
 
 /// The line's own step, and those after it, in which single messages are missing.
@@ -79,6 +80,7 @@ impl Defect {
         (Self::OscillatorTooFast, &["watchdogs"]),
         (Self::FlashBitStuck, &["flash"]),
         (Self::ErasesBothSlots, &["flash"]),
+        (Self::LogDead, &["log"]),
     ];
 
     /// Builds the defect into what is on the pins.
@@ -143,6 +145,11 @@ impl Defect {
             }
             Self::FlashBitStuck => chip.slots_mut().has_stuck_bit = true,
             Self::ErasesBothSlots => chip.slots_mut().erases_both = true,
+            Self::LogDead => {
+                // The mark by which a debug probe finds the log's buffer.
+                let places = machine.flip_in_flash(u32::from_le_bytes(*b"SEGG"), 0);
+                assert!(places > 0);
+            }
             _ => {}
         }
     }

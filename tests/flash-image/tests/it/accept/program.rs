@@ -1,30 +1,29 @@
 //! `painleve accept` at one end of a pseudo-terminal, a bare board at the other.
 
 use std::io::{Read, Write};
-use std::process::Stdio;
+use std::process::{Output, Stdio};
 use std::time::{Duration, Instant};
 
 use painleve_chips::MILLISECOND;
-use painleve_flash_image::board::F405;
+use painleve_flash_image::board::{EmulatedBoard, F405};
 use painleve_tests::Bench;
 use painleve_tests::line::terminal;
+use serde_json::Value;
 
+use crate::accept::defect::Defect;
 use crate::accept::{FIRST_SEED, board};
 use crate::drive::rig::is_readable;
 
 /// Longest time of the command, on a machine that is busy.
 const LIMIT: Duration = Duration::from_secs(300);
 
-/// On a busy machine the emulated board is slower than real time, which steps by the host's clock may find.
-#[test]
-#[ignore = "takes longer than 20 s"]
-fn the_command_writes_its_report() {
+/// Runs the command until it ends.
+fn run(mut board: EmulatedBoard<F405>) -> (Bench, Output) {
     let (mut near, _far, port) = terminal();
     let folder = Bench::new("accept");
     let mut command = folder.command(&["accept", "--json", "--output", "report.html"]);
     command.arg("--port").arg(&port);
     command.stdout(Stdio::piped()).stderr(Stdio::piped());
-    let mut board = board::<F405>(FIRST_SEED, None).board;
     board.take_sent();
     let mut child = command.spawn().unwrap();
     let start = Instant::now();
@@ -43,10 +42,33 @@ fn the_command_writes_its_report() {
         due = (due + Duration::from_millis(1)).max(Instant::now());
         std::thread::sleep(due.saturating_duration_since(Instant::now()));
     }
-    let output = child.wait_with_output().unwrap();
+    (folder, child.wait_with_output().unwrap())
+}
+
+/// The report that the command prints, whose verdict is that of its exit code.
+fn report(output: &Output) -> Value {
+    let report: Value = serde_json::from_slice(&output.stdout).unwrap();
+    let code = i32::from(report["verdict"] != "passed");
+    let text = painleve_tests::errors(output);
+    assert_eq!(output.status.code(), Some(code), "{text}");
+    report
+}
+
+#[test]
+fn the_command_fails_on_another_chip() {
+    let (_folder, output) = run(board::<F405>(FIRST_SEED, Some(Defect::OtherChip)).board);
+    let report = report(&output);
+    assert_eq!(report["verdict"], "failed", "{report}");
+    assert_eq!(output.status.code(), Some(1));
+}
+
+/// On a busy machine the emulated board is slower than real time, which steps by the host's clock may find.
+#[test]
+#[ignore = "takes longer than 20 s"]
+fn the_command_writes_its_report() {
+    let (folder, output) = run(board::<F405>(FIRST_SEED, None).board);
+    let report = report(&output);
     let text = painleve_tests::errors(&output);
-    assert!(matches!(output.status.code(), Some(0 | 1)), "{text}");
-    let report: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
     let passed = |name: &str| {
         let steps = report["steps"].as_array().unwrap();
         let step = steps.iter().find(|it| it["name"] == name).unwrap();
@@ -56,10 +78,7 @@ fn the_command_writes_its_report() {
         assert!(passed(step), "{step}: {text}");
     }
     let written = std::fs::read_to_string(folder.path("report.json")).unwrap();
-    assert_eq!(
-        report,
-        serde_json::from_str::<serde_json::Value>(&written).unwrap()
-    );
+    assert_eq!(report, serde_json::from_str::<Value>(&written).unwrap());
     let page = std::fs::read_to_string(folder.path("report.html")).unwrap();
     assert!(page.contains("STM32F405") && page.contains("measured"));
 }
