@@ -65,10 +65,10 @@ fn every_test_that_the_tables_name_exists() {
                 assert!(tests.contains(&format!("fn {name}")), "{name}: {row}");
                 count += 1;
             }
-            let is_hazard = heading == "## Hazards" && names().count() > 0;
+            let is_hazard = heading == "## Hazards" && !row.starts_with("| failure |");
             assert!(
                 !is_hazard || names().any(|it| is_on_both(&tests, it)),
-                "one board: {row}"
+                "no test on both boards: {row}"
             );
         }
     }

@@ -76,12 +76,14 @@ fn a_stack_that_overflows_takes_the_torque_off_and_is_recorded<C: BoardChip>() {
     assert_off_in_time(bench);
 }
 
-/// Stores to the program, where it is executed and where it comes from, and executes the stack.
+/// Stores to the program, where it is executed, at the same memory's other address and where it comes from, and executes the
+/// stack.
 fn code_is_not_changed_and_data_is_not_executed<C: BoardChip>() {
     let mut bench = driven::<C>();
     let healthy = bench.snapshot();
     let program = bench.board.machine.symbol("main").unwrap() & !3;
-    for address in [program, C::FLASH.0 + 0x1000] {
+    let copy = (C::ALIASED_RAM > 0).then_some(C::RAM.0 + program);
+    for address in [program, C::FLASH.0 + 0x1000].into_iter().chain(copy) {
         bench.restore(&healthy);
         bench.board.machine.store(address);
         assert_eq!(recorded_status(&mut bench) & 0xff, 1 << 1, "{address:#x}");

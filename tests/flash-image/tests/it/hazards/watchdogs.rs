@@ -1,11 +1,13 @@
 //! The watchdogs: they must neither reset a healthy board nor let a dead one drive on, in any phase of their prescalers.
 
 use painleve_chips::machine::Reset;
-use painleve_chips::{MILLISECOND, SECOND};
+use painleve_chips::{MILLISECOND, Picoseconds, SECOND};
 use painleve_flash_image::bench::{Bench, encoded, with_one_sensor};
 use painleve_flash_image::board::{BoardChip, EmulatedBoard};
+use painleve_plant::law_choice::build;
 use painleve_plant::scenario::Scenario;
-use painleve_shared::message::{FrameSource, RefusedRate, Response};
+use painleve_shared::message::{FrameSource, RefusedRate, Request, Response};
+use painleve_shared::stored::StoredState;
 
 use super::DEFAULT;
 
@@ -13,6 +15,7 @@ crate::on_each_board! {
     a_finished_tick_feeds_the_watchdogs_in_time,
     a_plant_that_the_host_simulates_may_have_any_rate,
     a_running_board_can_be_configured_anew,
+    a_driven_board_stores_and_forgets_without_a_reset,
 }
 
 fn at_rate(tick_hz: u32) -> Scenario {
@@ -102,9 +105,10 @@ fn a_plant_that_the_host_simulates_may_have_any_rate<C: BoardChip>() {
     }
 }
 
+/// Driven at rates up to 8 kHz: at faster ones the readings of the force cell come too late.
 fn a_running_board_can_be_configured_anew<C: BoardChip>() {
     // The STM32F405 refuses the faster ones.
-    let faster = [(9000, 0), (9000, 333_333), (10_000, 555_555)];
+    let faster = [(8000, 0), (9000, 0), (9000, 333_333), (10_000, 555_555)];
     let faster = match C::IMAGE {
         "painleve-f405" => &faster[..0],
         _ => &faster[..],
@@ -112,17 +116,57 @@ fn a_running_board_can_be_configured_anew<C: BoardChip>() {
     let rates = [(1000, 0), (5000, 0), (5000, 777_777), (6600, 0)];
     for oscillator_hz in C::OSCILLATOR_HZ {
         for (tick_hz, phase) in rates.iter().chain(faster).copied() {
-            let scenario = at_rate(tick_hz);
-            let mut board = booted::<C>(oscillator_hz, phase);
+            let place = format!("{tick_hz} Hz, oscillator of {oscillator_hz} Hz, phase {phase}");
+            let board = booted(oscillator_hz, phase);
+            let mut bench = Bench::<C>::with_board(&at_rate(tick_hz), board);
+            if tick_hz <= 8000 {
+                bench.drive();
+            }
+            let board = &mut bench.board;
             for _ in 0..6 {
-                let response = board.configure(FrameSource::Sensors, &encoded(&scenario));
+                let response = board.configure(FrameSource::Sensors, &encoded(&at_rate(tick_hz)));
                 let is_ready = matches!(response, Some(Response::Ready { .. }));
-                let resets = board.resets();
-                assert!(
-                    is_ready && resets.is_empty(),
-                    "{tick_hz} Hz, oscillator of {oscillator_hz} Hz, phase {phase}: {response:?}, {resets:?}"
-                );
+                assert!(is_ready, "{place}: {response:?}");
+                assert!(board.torque().is_off(), "{place}");
                 board.machine.run_for(5 * MILLISECOND);
+                assert!(board.torque().is_off(), "{place}");
+                assert_eq!(board.resets(), [], "{place}");
+            }
+        }
+    }
+}
+
+/// An erasure takes many ticks, in which nothing else but the watchdogs is served.
+fn a_driven_board_stores_and_forgets_without_a_reset<C: BoardChip>() {
+    const ERASURE: Picoseconds = 25 * MILLISECOND;
+    let rates: &[u32] = match C::IMAGE {
+        "painleve-f405" => &[5000],
+        _ => &[5000, 8000],
+    };
+    for oscillator_hz in C::OSCILLATOR_HZ {
+        for tick_hz in rates.iter().copied() {
+            let configuration = encoded(&at_rate(tick_hz));
+            let store = Request::Store {
+                build: build(),
+                configuration: &configuration,
+            };
+            for (request, state) in [
+                (store, StoredState::Intact),
+                (Request::Forget, StoredState::Empty),
+            ] {
+                let board = booted(oscillator_hz, 0);
+                let mut bench = Bench::<C>::with_board(&at_rate(tick_hz), board);
+                bench.drive();
+                let board = &mut bench.board;
+                board.machine.chip_mut().slots_mut().erasure = ERASURE;
+                board.send(&request);
+                let response = board.reply(4 * ERASURE);
+                let is_done = matches!(&response, Some(Response::Stored(it)) if it.state == state);
+                assert!(is_done, "{tick_hz} Hz, {request:?}: {response:?}");
+                assert!(board.torque().is_off());
+                board.machine.run_for(100 * MILLISECOND);
+                assert!(board.torque().is_off());
+                assert_eq!(board.resets(), [], "{tick_hz} Hz, {request:?}");
             }
         }
     }
