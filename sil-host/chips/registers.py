@@ -4,7 +4,7 @@
     cargo fetch && python3 sil-host/chips/registers.py
 
 The source is not ours: the crates stm32f4 and stm32g4 (MIT or Apache-2.0), which the project stm32-rs generates from ST's own SVD
-files, corrected by its users. A line is a peripheral: its name, its addresses, and for each register `offset=bits`.
+files, corrected by its users. A line is a peripheral: its name, its address, and for each register `offset=bits`, or `offset=bits:value` if it is not zero after a reset.
 """
 
 import pathlib
@@ -26,17 +26,19 @@ FIELD = re.compile(r"\n    ///Bits? (\d+)(?::(\d+))?\b")
 
 
 def bits(text):
-    """Returns the bits of a register's fields, or all if it has none, and those that a reset sets: reserved ones keep their value."""
+    """Returns the bits of a register's fields, or all if it has none, and those that a reset sets: reserved ones keep their value.
+    Returns the value after a reset, too."""
     mask = 0
     for first, last in FIELD.findall(text):
         mask |= (2 << int(last or first)) - (1 << int(first))
     width = {"u8": 8, "u16": 16, "u32": 32}[re.search(r"type Ux = (u\d+);", text)[1]]
     reset = re.search(r"const RESET_VALUE: u\d+ = (0x[0-9a-f_]+);", text)
-    return (mask or (1 << width) - 1) | int(reset[1] if reset else "0", 16)
+    value = int(reset[1] if reset else "0", 16)
+    return (mask or (1 << width) - 1) | value, value
 
 
 def registers(module):
-    """Returns offset and bits of each register in a module, and the module's length."""
+    """Returns the bits of each register in a module, and its value after a reset, by offset."""
     text = module.with_suffix(".rs").read_text()
     found = {}
     for first, end, name, is_indexed, kind in REGISTER.findall(text):
@@ -55,9 +57,10 @@ def registers(module):
             count = int(number[1])
         step = (int(end, 16) - first) // count if end else 0
         for place in range(count):
-            for offset, mask in inner.items():
+            for offset, (mask, value) in inner.items():
                 at = first + place * step + offset
-                found[at] = found.get(at, 0) | mask
+                other_mask, other_value = found.get(at, (0, 0))
+                found[at] = other_mask | mask, other_value | value
     return found
 
 
@@ -72,7 +75,9 @@ def main():
         for name, module, address in periphs:
             if name in names.split():
                 found = registers(source / module)
-                listed = " ".join(f"{offset:x}={mask:x}" for offset, mask in sorted(found.items()))
+                listed = " ".join(
+                    f"{offset:x}={mask:x}" + (f":{value:x}" if value else "") for offset, (mask, value) in sorted(found.items())
+                )
                 lines.append(f"{name} {address.replace('_', '')} {listed}")
         (FOLDER / f"src/registers/{chip}.txt").write_text("\n".join(lines) + "\n")
 

@@ -5,12 +5,13 @@ use std::collections::BTreeMap;
 
 use crate::bit_band::bit_band;
 
-/// The registers of the peripherals in use: bits by address.
+/// The registers of the peripherals in use: bits, and the value after a reset, by address.
 #[derive(Clone, Debug)]
-pub struct Registers(BTreeMap<u32, u32>);
+pub struct Registers(BTreeMap<u32, (u32, u32)>);
 
 impl Registers {
-    /// Parses a table: in each line a peripheral's name, address, and `offset=bits` of its registers.
+    /// Parses a table: in each line a peripheral's name, address, and of its registers `offset=bits`, or
+    /// `offset=bits:value` if a reset leaves another value than 0.
     pub fn parse(table: &str) -> Self {
         let number = |text: &str| u32::from_str_radix(text, 16).ok();
         let registers = table.lines().flat_map(|line| {
@@ -18,10 +19,38 @@ impl Registers {
             let base = words.next().and_then(number).unwrap_or_default();
             words.filter_map(move |word| {
                 let (offset, bits) = word.split_once('=')?;
-                Some((base + number(offset)?, number(bits)?))
+                let (bits, value) = bits.split_once(':').unwrap_or((bits, "0"));
+                Some((base + number(offset)?, (number(bits)?, number(value)?)))
             })
         });
         Self(registers.collect())
+    }
+
+    /// Returns the addresses of all registers, with their values after a reset.
+    pub fn after_reset(&self) -> impl Iterator<Item = (u32, u32)> {
+        self.0
+            .iter()
+            .map(|(address, (_, value))| (*address, *value))
+    }
+
+    /// Returns what a store of `size` bytes brings to a register: the bridges of the peripherals' slow buses (APB) repeat a
+    /// byte or a half word, so that it changes the whole register.
+    ///
+    /// # Panics
+    /// If a narrow store goes to another bus, or not to the beginning of a register.
+    pub fn on_the_bus(&self, address: u32, size: u32, value: u32) -> u32 {
+        const SLOW: std::ops::Range<u32> = 0x4000_0000..0x4002_0000;
+        let repeated = match size {
+            1 => (value & 0xff) * 0x0101_0101,
+            2 => (value & 0xffff) * 0x0001_0001,
+            _ => return value,
+        };
+        let (bits, _) = self.0.get(&address).copied().unwrap_or_default();
+        assert!(
+            bits != 0 && SLOW.contains(&address),
+            "store of {size} bytes to {address:#010x}"
+        );
+        repeated & bits
     }
 
     /// Checks a load or, with a value, a store of `size` bytes.
@@ -33,7 +62,7 @@ impl Registers {
             Some((word, bit)) => (word, 1, bit),
             None => (address & !3, 8 * size, 8 * (address & 3)),
         };
-        let Some(bits) = self.0.get(&word) else {
+        let Some((bits, _)) = self.0.get(&word) else {
             panic!("there is no register at {address:#010x}");
         };
         let low = |bits: u32| u32::MAX >> (32 - bits);
@@ -52,7 +81,7 @@ mod tests {
 
     #[test]
     fn what_a_chip_does_not_have_is_refused() {
-        let registers = Registers::parse("# source\nWWDG 40002c00 0=ff 4=3ff\n");
+        let registers = Registers::parse("# source\nWWDG 40002c00 0=ff:7f 4=3ff\n");
         let is_refused = |address, size, stored| {
             catch_unwind(|| registers.check(address, size, stored)).is_err()
         };

@@ -196,6 +196,11 @@ impl<C: Chip> Surroundings for Core<C> {
             self.is_reprotected |= address == 0xe000_ed94;
         } else {
             self.check(address, size, Some(value));
+            let value = if PERIPHERALS[0].contains(&address) {
+                self.registers.on_the_bus(address, size, value)
+            } else {
+                value
+            };
             self.chip.write(address, size, value, self.now);
         }
     }

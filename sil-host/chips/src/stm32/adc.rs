@@ -58,13 +58,32 @@ pub struct Adc {
 impl Adc {
     /// Creates a converter in its reset state.
     pub fn new(layout: AdcLayout) -> Self {
+        let mut registers = [0; 256];
+        // The watchdogs' thresholds and, of both converters of a block, control and configuration.
+        let after_reset: &[(usize, u32)] = match layout {
+            AdcLayout::Plain => &[(0x24, 0xfff)],
+            AdcLayout::Regulated => &[
+                (0x08, DEEP_POWER_DOWN),
+                (0x0c, 0x8000_0000),
+                (0x20, 0x0fff_0000),
+                (0x24, 0x00ff_0000),
+                (0x28, 0x00ff_0000),
+                (0x10c, 0x8000_0000),
+                (0x120, 0x0fff_0000),
+                (0x124, 0x00ff_0000),
+                (0x128, 0x00ff_0000),
+            ],
+        };
+        for (offset, value) in after_reset {
+            registers[offset / 4] = *value;
+        }
         Self {
             layout,
             control: match layout {
                 AdcLayout::Plain => 0,
                 AdcLayout::Regulated => DEEP_POWER_DOWN,
             },
-            registers: [0; 256],
+            registers,
             settled_at: 0,
             calibrated_at: Picoseconds::MAX,
             result: 0,

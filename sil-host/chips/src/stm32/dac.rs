@@ -36,6 +36,8 @@ impl Dac {
             0x14 | 0x30 => self.codes[1],
             0x20 => self.codes[0] | self.codes[1] << 16,
             0x3c => self.modes,
+            // Times of sample and hold, which is not modelled.
+            0x48 | 0x4c => 0x0001_0001,
             _ => 0,
         }
     }

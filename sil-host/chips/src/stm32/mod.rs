@@ -165,6 +165,19 @@ pub fn check_spi_pins(port_b: &Gpio, bus: usize) {
     assert!(port_b.speed(clock) >= HIGH_SPEED, "PB{clock} is slow");
 }
 
+/// Checks an SPI's control registers before a word: a master whose select input is held high, which else goes off (MODF),
+/// with both data lines, the highest bit first, no checksum, and no pause between words.
+pub fn check_spi_words([first, second]: [u32; 2]) {
+    const HELD_HIGH: u32 = 1 << 9 | 1 << 8;
+    const LOWEST_FIRST: u32 = 1 << 7;
+    const ONE_LINE: u32 = 1 << 15 | 1 << 14 | 1 << 10;
+    const CHECKSUM: u32 = 1 << 13 | 1 << 12;
+    const OTHER_FRAMES: u32 = 1 << 4 | 1 << 3;
+    let needed = first & (HELD_HIGH | LOWEST_FIRST | ONE_LINE | CHECKSUM);
+    assert_eq!(needed, HELD_HIGH, "words that no part understands");
+    assert_eq!(second & OTHER_FRAMES, 0, "frames that no part understands");
+}
+
 /// Checks that pins belong to the peripheral that uses them, by the number of its function.
 pub fn check_function<const N: usize>(port: &Gpio, pins: [usize; N], function: u8) {
     for pin in pins {

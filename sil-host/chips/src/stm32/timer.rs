@@ -60,7 +60,8 @@ impl Timer {
     /// Returns the time until the next update, from a count of `count`.
     fn count_ps(&self, counts: u64, hz: u64) -> Picoseconds {
         let counts = u128::from(counts) * u128::from(self.prescaler + 1);
-        (counts * u128::from(SECOND) / u128::from(hz.max(1))) as u64
+        let time = counts * u128::from(SECOND) / u128::from(hz.max(1));
+        time.try_into().unwrap_or(Picoseconds::MAX)
     }
 
     /// Captures the count at a falling edge of the first channel, if it is to.
@@ -83,6 +84,22 @@ impl Timer {
         self.captured
     }
 
+    /// Takes the present count as the one from which time is counted; parts of a count stay.
+    fn settle(&mut self, hz: u64, now: Picoseconds) {
+        if self.runs() {
+            let passed = self.counts_since(hz, now);
+            self.count = (self.count + passed) & u64::from(u32::MAX);
+            self.since += self.count_ps(passed, hz);
+        } else {
+            self.since = now;
+        }
+    }
+
+    fn counts_since(&self, hz: u64, now: Picoseconds) -> u64 {
+        let passed = u128::from(now - self.since) * u128::from(hz) / u128::from(SECOND);
+        (passed / u128::from(self.prescaler + 1)) as u64
+    }
+
     /// Handles a load.
     pub fn read(&self, offset: u32, hz: u64, now: Picoseconds) -> u32 {
         match offset {
@@ -92,10 +109,7 @@ impl Timer {
             0x18 => self.modes,
             0x20 => self.edges,
             0x34 => self.captured,
-            0x24 if self.runs() => {
-                let passed = u128::from(now - self.since) * u128::from(hz) / u128::from(SECOND);
-                (u128::from(self.count) + passed / u128::from(self.prescaler + 1)) as u32
-            }
+            0x24 if self.runs() => (self.count + self.counts_since(hz, now)) as u32,
             0x24 => self.count as u32,
             0x28 => self.next_prescaler,
             0x2c => self.reload,
@@ -107,8 +121,8 @@ impl Timer {
     pub fn write(&mut self, offset: u32, value: u32, hz: u64, now: Picoseconds) {
         match offset {
             0x00 => {
-                self.count = self.read(0x24, hz, now).into();
-                self.since = now;
+                assert_eq!(value & !1, 0, "a mode of the timer that is not modelled");
+                self.settle(hz, now);
                 self.control = value;
             }
             0x0c => self.interrupts = value,
@@ -125,16 +139,21 @@ impl Timer {
                 self.edges_seen *= value & 1;
             }
             0x28 => self.next_prescaler = value,
-            0x2c => self.reload = value,
+            0x2c => {
+                self.settle(hz, now);
+                self.reload = value;
+            }
             _ => {}
         }
     }
 
-    /// Returns the time of the next overflow.
+    /// Returns the time of the next overflow. A count beyond the reload passes 2^32 first, and no event comes with that.
     pub fn next_event(&self, hz: u64) -> Picoseconds {
         if self.runs() && hz > 0 {
-            let left = (u64::from(self.reload) + 1).saturating_sub(self.count);
-            self.since + self.count_ps(left, hz)
+            let end = u64::from(self.reload) + 1;
+            let is_beyond = self.count >= end;
+            let left = end + (u64::from(is_beyond) << 32) - self.count;
+            self.since.saturating_add(self.count_ps(left, hz))
         } else {
             Picoseconds::MAX
         }

@@ -53,6 +53,18 @@ impl UsartLayout {
         }
     }
 
+    /// Bits of the control registers that a line of 8N1 may set, and those that switch interrupts and DMA on. All
+    /// others change the format or the timing.
+    fn known(self) -> [u32; 3] {
+        const INTERRUPTS: u32 = 0x1f0;
+        const ERRORS_AND_DMA: u32 = 1 | 3 << 6;
+        [
+            self.enable() | INTERRUPTS | TRANSMITTER | RECEIVER,
+            0,
+            ERRORS_AND_DMA,
+        ]
+    }
+
     /// The bit of the first control register that switches the port on.
     fn enable(self) -> u32 {
         match self {
@@ -119,8 +131,30 @@ impl Usart {
     }
 
     /// Returns the duration of a byte on the line.
+    ///
+    /// # Panics
+    /// If the line does not have the host's format.
     fn byte(&self, clock_hz: u64) -> Picoseconds {
-        10 * SECOND * u64::from(self.baud.max(1)) / clock_hz.max(1)
+        let unknown: [u32; 3] =
+            std::array::from_fn(|it| self.control[it] & !self.layout.known()[it]);
+        assert!(
+            unknown == [0; 3] && self.baud > 0,
+            "the line is not 8N1 with a rate: {unknown:#x?}"
+        );
+        10 * SECOND * u64::from(self.baud) / clock_hz.max(1)
+    }
+
+    fn is_at_hosts_rate(&self, clock_hz: u64) -> bool {
+        clock_hz.abs_diff(u64::from(self.baud) * HOST_BAUD) <= clock_hz / 50
+    }
+
+    /// Returns what comes of a byte at the other end: another one if the clock has changed since the rate was set.
+    fn carried(&self, byte: u8, clock_hz: u64) -> u8 {
+        if self.is_at_hosts_rate(clock_hz) {
+            byte
+        } else {
+            !byte
+        }
     }
 
     /// Handles a load.
@@ -156,11 +190,16 @@ impl Usart {
                 self.send(value as u8, clock_hz, now)
             }
             Register::Baud => {
-                let apart_hz = clock_hz.abs_diff(u64::from(value) * HOST_BAUD);
-                assert!(apart_hz <= clock_hz / 50, "{clock_hz} Hz / {value}");
+                let is_on = self.control[0] & self.layout.enable() != 0;
+                assert!(
+                    self.layout == UsartLayout::SharedData || !is_on,
+                    "the rate of a port that is on"
+                );
                 self.baud = value;
+                assert!(self.is_at_hosts_rate(clock_hz), "{clock_hz} Hz / {value}");
             }
             Register::Control(number) => self.control[number] = value,
+            Register::Other => assert_eq!(value, 0, "{offset:#x} is not modelled"),
             _ => {}
         }
     }
@@ -191,7 +230,7 @@ impl Usart {
         if let Some((byte, at)) = self.shifting
             && at <= now
         {
-            self.outgoing.push(byte);
+            self.outgoing.push(self.carried(byte, clock_hz));
             self.shifting = self.waiting.take().map(|it| (it, at + self.byte(clock_hz)));
             self.flags |= EMPTY;
             if self.shifting.is_none() {
@@ -216,7 +255,7 @@ impl Usart {
                 self.flags |= OVERRUN;
                 self.overruns += 1;
             } else {
-                self.received = byte.into();
+                self.received = self.carried(byte, clock_hz).into();
                 self.flags |= RECEIVED;
             }
             // One byte at a time, so that DMA can read it.

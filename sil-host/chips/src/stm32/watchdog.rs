@@ -97,6 +97,8 @@ impl Watchdog {
             0x0c => {
                 u32::from(self.prescaler.is_busy(now)) | u32::from(self.reload.is_busy(now)) << 1
             }
+            // The window is not modelled.
+            0x10 => 0xfff,
             _ => 0,
         }
     }
@@ -123,6 +125,7 @@ impl Watchdog {
                 self.expires = self.at_the_new_pace(self.expires);
             }
             (0x08, _) if self.is_open => self.reload.set(value & 0xfff, from, now),
+            (0x10, _) => panic!("the independent watchdog's window is not modelled"),
             _ => {}
         }
     }
@@ -191,16 +194,16 @@ impl WindowWatchdog {
             prescaler: (position, (1 << bits) - 1),
             phase: 0,
             slowness: 1,
-            control: 0,
-            configuration: 0,
+            control: 0x7f,
+            configuration: 0x7f,
             expires: None,
         }
     }
 
     /// Resets the registers.
     pub fn reset(&mut self) {
-        self.control = 0;
-        self.configuration = 0;
+        self.control = 0x7f;
+        self.configuration = 0x7f;
         self.expires = None;
     }
 
@@ -223,9 +226,43 @@ impl WindowWatchdog {
                     self.expires = Some(self.expiry(clock_hz, now));
                 }
             }
-            0x04 => self.configuration = value,
+            0x04 => {
+                // What is left to count stays, at the new pace.
+                let left = self.expires.map(|at| {
+                    let [now, end] = [now, at].map(|it| self.counted(clock_hz, it));
+                    end.saturating_sub(now)
+                });
+                self.configuration = value;
+                self.expires = left.map(|left| self.end(clock_hz, now, left));
+            }
             _ => {}
         }
+    }
+
+    fn cycles_per_count(&self) -> u128 {
+        let (position, mask) = self.prescaler;
+        1 << (12 + (self.configuration >> position & mask))
+    }
+
+    fn clock_hz(&self, clock_hz: u64) -> u128 {
+        (clock_hz / self.slowness.max(1)).max(1).into()
+    }
+
+    fn phase(&self) -> u128 {
+        u128::from(self.phase) % self.cycles_per_count()
+    }
+
+    /// Returns the counts of the prescaler until this time.
+    fn counted(&self, clock_hz: u64, now: Picoseconds) -> u128 {
+        let cycles = u128::from(now) * self.clock_hz(clock_hz) / u128::from(SECOND);
+        (cycles + self.phase()) / self.cycles_per_count()
+    }
+
+    /// Returns when the prescaler has counted this far from now.
+    fn end(&self, clock_hz: u64, now: Picoseconds, counts: u128) -> Picoseconds {
+        let counted = self.counted(clock_hz, now) + counts;
+        let end = (counted * self.cycles_per_count()).saturating_sub(self.phase());
+        (end * u128::from(SECOND)).div_ceil(self.clock_hz(clock_hz)) as Picoseconds
     }
 
     /// Returns when bit 6 of the counter falls.
@@ -233,15 +270,7 @@ impl WindowWatchdog {
         if self.control & 0x40 == 0 {
             return now;
         }
-        let (position, mask) = self.prescaler;
-        let cycles_per_count = 1 << (12 + (self.configuration >> position & mask));
-        let counts = u64::from(self.control & 0x3f) + 1;
-        let clock_hz = u128::from((clock_hz / self.slowness.max(1)).max(1));
-        let cycles = u128::from(now) * clock_hz / u128::from(SECOND);
-        let phase = u128::from(self.phase % cycles_per_count);
-        let counted = (cycles + phase) / u128::from(cycles_per_count);
-        let end = (counted + u128::from(counts)) * u128::from(cycles_per_count) - phase;
-        (end * u128::from(SECOND)).div_ceil(clock_hz) as Picoseconds
+        self.end(clock_hz, now, u128::from(self.control & 0x3f) + 1)
     }
 
     /// Returns when the watchdog resets the microcontroller.

@@ -6,8 +6,8 @@ mod rcc;
 mod spi;
 
 use self::dma::{Dma, Request};
-use self::rcc::Rcc;
-use self::spi::Spi;
+pub use self::rcc::Rcc;
+pub use self::spi::Spi;
 use crate::bit_band::bit_band;
 use crate::machine::{Chip, Reset};
 use crate::stm32::{
@@ -63,6 +63,9 @@ const FASTEST_HZ: u64 = 168_000_000;
 const SECOND_SCALE_HZ: u64 = 144_000_000;
 const PER_WAIT_STATE_HZ: u64 = 30_000_000;
 
+/// Bits of the digital-to-analog converter's control register that are modelled: channels on, and their buffers off.
+const CONVERTER: u32 = 0x0003_0003;
+
 /// Stores of four bytes.
 const WORDS: u32 = 2 << 8;
 
@@ -77,6 +80,9 @@ const USUAL_OPTIONS: u32 = 0x0fff_aae1;
 /// Longest programming of the option bytes: the manual gives no time. Their sector is erased before, and the data
 /// sheet's shortest sector, of 16 KiB, takes up to 800 ms.
 const OPTION_TIME: Picoseconds = 800 * MILLISECOND;
+
+/// Longest programming of a word by the data sheet; it usually takes 16 µs.
+const WORD_TIME: Picoseconds = 100 * MICROSECOND;
 
 /// First sector of the slots, and its length.
 const FIRST_SECTOR: u32 = 10;
@@ -252,7 +258,10 @@ impl<O: Outside> Stm32f4<O> {
                 self.note_supply(was_low);
                 self.check_clock();
             }
-            0x4000_7400 if self.rcc.is_on(0x40, 29) => self.dac.write(offset, value),
+            0x4000_7400 if self.rcc.is_on(0x40, 29) => {
+                self.dac.write(offset, value);
+                assert_eq!(self.dac.control & !CONVERTER, 0, "a trigger or a wave");
+            }
             0x4001_1000 if self.rcc.is_on(0x44, 4) => self.usart.write(offset, value, fast, now),
             0x4001_2000 if self.rcc.is_on(0x44, 8) => {
                 let (dac, outside) = (&self.dac, &mut self.outside);
@@ -394,7 +403,7 @@ impl<O> Stm32f4<O> {
         if self.is_write_protected(offset / SECTOR as u32) {
             return;
         }
-        let until = now + 16 * MICROSECOND;
+        let until = now + WORD_TIME;
         let power = self
             .slots
             .program(offset as usize, &word.to_le_bytes(), until);
@@ -471,12 +480,13 @@ impl<O: Outside> Chip for Stm32f4<O> {
         {
             return self.store_slot(offset, value, size, now);
         }
-        // A narrow store to a peripheral writes only its own bytes of the register.
-        assert!(address & 3 == 0 || size == 4, "store to {address:#010x}");
         self.store(address, value, now);
     }
 
     fn advance(&mut self, now: Picoseconds, memory: &Processor) {
+        if self.rcc.advance(now) {
+            self.check_clock();
+        }
         let (slow, fast) = (self.rcc.slow_bus_hz(), self.rcc.fast_bus_hz());
         self.timer.advance(self.rcc.slow_timer_hz(), now);
         for (bus, hz) in [fast, slow].into_iter().enumerate() {
@@ -513,6 +523,7 @@ impl<O: Outside> Chip for Stm32f4<O> {
         let spis = self.spis[0].next_event().min(self.spis[1].next_event());
         timer
             .min(spis)
+            .min(self.rcc.next_event())
             .min(self.usart.next_event())
             .min(self.watchdog.expires())
             .min(self.window_watchdog.expires())

@@ -21,12 +21,18 @@ const CRYSTAL_START: Picoseconds = 2 * MILLISECOND;
 /// Longest time until the phase-locked loop has settled.
 const LOCK: Picoseconds = 300 * MICROSECOND;
 
+/// Time until the system clock is another one. The manual gives none, but flags that tell.
+const SWITCH: Picoseconds = 2 * MICROSECOND;
+
 /// Registers of the clock control.
 #[derive(Clone, Debug)]
 pub struct Rcc {
     control: u32,
     pll: u32,
     configuration: u32,
+    /// The system clock, and when it becomes that of the configuration.
+    source: u32,
+    switches_at: Picoseconds,
     interrupts: u32,
     registers: [u32; 32],
     flags: u32,
@@ -43,12 +49,27 @@ pub struct Rcc {
 impl Rcc {
     /// Creates the registers in their state after the first reset.
     pub fn new() -> Self {
+        let mut registers = [0; 32];
+        // The clock of the core-coupled memory is on, and in sleep all that may be.
+        let on = [
+            (0x30, 0x0010_0000),
+            (0x50, 0x7e67_91ff),
+            (0x54, 0xf1),
+            (0x58, 0x1),
+            (0x60, 0x36fe_c9ff),
+            (0x64, 0x0007_5f33),
+        ];
+        for (offset, value) in on {
+            registers[offset / 4] = value;
+        }
         Self {
             control: 0x83,
             pll: 0x2400_3010,
             configuration: 0,
+            source: 0,
+            switches_at: Picoseconds::MAX,
             interrupts: 0,
-            registers: [0; 32],
+            registers,
             flags: 0,
             hse_ready_at: Picoseconds::MAX,
             pll_ready_at: Picoseconds::MAX,
@@ -108,10 +129,12 @@ impl Rcc {
                 self.control & !(HSE_READY | PLL_READY) | ready | locked
             }
             0x04 => self.pll,
-            0x08 => self.configuration & !0xc | (self.configuration & 3) << 2,
+            0x08 => self.configuration & !0xc | self.source << 2,
             0x0c => self.interrupts | u32::from(self.nmi) << 7,
             0x74 => self.flags | self.registers[0x1d] & 1 | (self.registers[0x1d] & 1) << 1,
             0x10..0x80 => self.registers[(offset / 4) as usize],
+            // The loop of I2S, which is not modelled.
+            0x84 => 0x2000_3000,
             _ => 0,
         }
     }
@@ -145,6 +168,9 @@ impl Rcc {
                 };
                 let is_switch = (self.configuration ^ value) & 3 != 0;
                 assert!(is_ready || !is_switch, "the clock is not ready");
+                if is_switch {
+                    self.switches_at = now + SWITCH;
+                }
                 self.configuration = value;
             }
             0x0c => {
@@ -164,6 +190,21 @@ impl Rcc {
         }
     }
 
+    /// Returns the time of the next event.
+    pub fn next_event(&self) -> Picoseconds {
+        self.switches_at
+    }
+
+    /// Performs due events; returns whether the system clock has changed.
+    pub fn advance(&mut self, now: Picoseconds) -> bool {
+        let is_due = now >= self.switches_at;
+        if is_due {
+            self.source = self.configuration & 3;
+            self.switches_at = Picoseconds::MAX;
+        }
+        is_due
+    }
+
     /// Stops the crystal; with the clock security system on, the processor continues on the
     /// internal oscillator.
     pub fn stop_crystal(&mut self) {
@@ -171,6 +212,8 @@ impl Rcc {
         if self.control & SECURITY_ON != 0 && self.control & HSE_ON != 0 {
             self.nmi = true;
             self.configuration &= !3;
+            self.source = 0;
+            self.switches_at = Picoseconds::MAX;
             self.control &= !(HSE_ON | PLL_ON);
         }
     }
@@ -196,7 +239,7 @@ impl Rcc {
 
     /// Returns the system clock before its dividers, Hz; 0 if it has stopped.
     fn system_hz(&self) -> u64 {
-        match self.configuration & 3 {
+        match self.source {
             0 => INTERNAL_HZ,
             1 if self.crystal_works => self.crystal_hz,
             1 => 0,

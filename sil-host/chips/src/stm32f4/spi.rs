@@ -1,8 +1,7 @@
 //! An SPI master (RM0090, section 28): polled, or with an interrupt for every received word.
 
-use crate::Transfer;
-
-use crate::{Picoseconds, SECOND};
+use crate::stm32::check_spi_words;
+use crate::{Picoseconds, SECOND, Transfer};
 
 const ENABLED_MASTER: u32 = 1 << 6 | 1 << 2;
 const RECEIVED: u32 = 1;
@@ -67,10 +66,11 @@ impl Spi {
 
     fn begin(&mut self, value: u16, clock_hz: u64, now: Picoseconds) {
         let [control, _] = self.control;
+        check_spi_words(self.control);
         let divisor = 2_u64 << (control >> 3 & 7);
         let bits = if control & 1 << 11 != 0 { 16 } else { 8 };
         let transfer = Transfer {
-            value,
+            value: value & u16::MAX >> (16 - bits),
             bits,
             hz: clock_hz / divisor,
             idles_high: control & 2 != 0,

@@ -27,6 +27,9 @@ const USUAL_OPTIONS: u32 = 0xffef_fcaa;
 /// have one.
 const OPTION_TIME: Picoseconds = 50 * MILLISECOND;
 
+/// Longest programming of a double word; it usually takes 82 µs.
+const DOUBLE_WORD_TIME: Picoseconds = 91 * MICROSECOND;
+
 /// First page of the slots in the second bank, and its length.
 const FIRST_PAGE: u32 = 126;
 const PAGE: usize = 2 << 10;
@@ -37,7 +40,7 @@ pub(super) const SLOTS: usize = 2 * PAGE;
 /// Registers and slots.
 #[derive(Clone)]
 pub(super) struct Flash {
-    registers: [u32; 16],
+    registers: [u32; 32],
     /// Number of keys that have come for the control register and for the option bytes.
     keys: [usize; 2],
     pub slots: FlashSlots,
@@ -61,8 +64,12 @@ pub(super) struct Flash {
 impl Flash {
     /// Creates an erased flash.
     pub fn new() -> Self {
-        let mut registers = [0; 16];
+        let mut registers = [0; 32];
         registers[8] = USUAL_OPTIONS;
+        // No part of the flash is protected against reading as data, or as secure.
+        registers[9] = 0xffff_0000;
+        registers[10] = 0x0fff_0000;
+        registers[28] = 0xff00_ff00;
         Self {
             registers,
             keys: [0; 2],
@@ -136,7 +143,7 @@ impl Flash {
         match offset {
             0x10 => u32::from(self.is_busy(now)) << 16 | self.errors,
             0x18 => u32::from(self.is_uncorrectable) << 31,
-            _ => self.registers[((offset / 4) & 15) as usize],
+            _ => self.registers[((offset / 4) & 31) as usize],
         }
     }
 
@@ -228,7 +235,7 @@ impl Flash {
             return Power::On;
         }
         let unit = (u64::from(word) << 32 | u64::from(low)).to_le_bytes();
-        let until = now + 82 * MICROSECOND;
-        self.slots.program(first as usize, &unit, until)
+        self.slots
+            .program(first as usize, &unit, now + DOUBLE_WORD_TIME)
     }
 }

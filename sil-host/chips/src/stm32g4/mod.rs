@@ -7,8 +7,9 @@ mod spi;
 
 use self::dma::{Dma, Request};
 use self::flash::{Flash, SLOTS};
-use self::rcc::{Rcc, bus};
-use self::spi::Spi;
+pub use self::rcc::Rcc;
+use self::rcc::bus;
+pub use self::spi::Spi;
 use crate::Picoseconds;
 use crate::bit_band::bit_band;
 use crate::machine::{Chip, Reset};
@@ -43,6 +44,9 @@ const TO_SEND: Request = Request {
 
 /// Bit of PWR_CR5 without which the regulator is in its boost mode.
 const BOOST_OFF: u32 = 1 << 8;
+
+/// Bits of the digital-to-analog converter's control register that are modelled: channels on.
+const CONVERTER: u32 = 0x0001_0001;
 
 /// Highest clock without and with the regulator's boost mode, Hz, and most wait states of the flash, each for an
 /// equal part of it.
@@ -150,7 +154,8 @@ impl<O: Outside> Stm32g4<O> {
                 0x1e0 => 0xffff_0000 | self.individual.flash_kib,
                 _ => 0,
             },
-            0xe004_2000 => self.individual.identification,
+            0xe004_2000 if offset == 0 => self.individual.identification,
+            0xe004_2000 => 0,
             _ => self.ports[(address >> 10 & 7) as usize].read(offset),
         }
     }
@@ -202,6 +207,9 @@ impl<O: Outside> Stm32g4<O> {
                 self.dac.write(offset, value);
                 self.check_converter(hz);
             }
+            // Debug control.
+            0xe004_2000 => {}
+            0x1fff_7400 => panic!("store to {address:#010x}, which cannot change"),
             _ => {
                 let port = (address >> 10 & 7) as usize;
                 let gpio = &mut self.ports[port];
@@ -213,6 +221,7 @@ impl<O: Outside> Stm32g4<O> {
 
     /// Checks that the digital-to-analog converter knows of a fast bus (RM0440, DAC_MCR: HFSEL).
     fn check_converter(&self, hz: u64) {
+        assert_eq!(self.dac.control & !CONVERTER, 0, "a trigger or a wave");
         let is_on = self.dac.control & 0x0001_0001 != 0;
         let needed = u32::from(hz > 80_000_000) + u32::from(hz > 160_000_000);
         assert!(
@@ -276,14 +285,18 @@ impl<O: Outside> Chip for Stm32g4<O> {
         self.adc = Adc::new(AdcLayout::Regulated);
         self.dma = Dma::default();
         self.power = [0; 33];
-        // The regulator's range 1 without boost.
+        // The regulator's range 1 without boost; the internal wake-up line.
         self.power[0] = 0x200;
+        self.power[2] = 0x8000;
         self.power[32] = 0x100;
         self.flash.reset(now);
         if matches!(reset, Reset::Power | Reset::BrownOut) {
             self.flash.load_options();
         }
         self.external_interrupts = [0; 16];
+        // The lines that only peripherals raise are not masked.
+        self.external_interrupts[0] = 0xff82_0000;
+        self.external_interrupts[8] = 0xffff_ff87;
         self.reset = None;
     }
 
@@ -311,11 +324,13 @@ impl<O: Outside> Chip for Stm32g4<O> {
             return self.note_power(power);
         }
         assert!(bit_band(address).is_none(), "store to {address:#010x}");
-        assert!(address & 3 == 0 || size == 4, "store to {address:#010x}");
         self.store(address, value, size, now);
     }
 
     fn advance(&mut self, now: Picoseconds, memory: &Processor) {
+        if self.rcc.advance(now) {
+            self.check_clock();
+        }
         let hz = self.rcc.bus_hz();
         self.timer.advance(hz, now);
         for bus in 0..2 {
@@ -351,6 +366,7 @@ impl<O: Outside> Chip for Stm32g4<O> {
         let spis = self.spis[0].next_event().min(self.spis[1].next_event());
         self.next_tick()
             .min(spis)
+            .min(self.rcc.next_event())
             .min(self.usart.next_event())
             .min(self.watchdog.expires())
             .min(self.window_watchdog.expires())

@@ -37,12 +37,18 @@ const UNDIVIDED_HZ: u64 = 80_000_000;
 /// Longest time until the phase-locked loop has settled.
 const LOCK: Picoseconds = 40 * MICROSECOND;
 
+/// Time until the system clock is another one. The manual gives none, but flags that tell.
+const SWITCH: Picoseconds = 2 * MICROSECOND;
+
 /// Registers of the clock control.
 #[derive(Clone, Debug)]
 pub struct Rcc {
     control: u32,
     pll: u32,
     configuration: u32,
+    /// The system clock, and when it becomes that of the configuration.
+    source: u32,
+    switches_at: Picoseconds,
     registers: [u32; 40],
     flags: u32,
     hse_ready_at: Picoseconds,
@@ -61,12 +67,26 @@ impl Rcc {
     /// Creates the registers in their state after the first reset.
     pub fn new() -> Self {
         let mut registers = [0; 40];
-        // The flash's clock is on.
-        registers[(bus::AHB1 / 4) as usize] = 0x100;
+        // The clocks of the flash and of the interface to the real-time clock are on, and in sleep all that may be.
+        let on = [
+            (bus::AHB1, 0x100),
+            (bus::APB1, 0x400),
+            (0x68, 0x130f),
+            (0x6c, 0x050f_667f),
+            (0x70, 0x101),
+            (0x78, 0xd2fe_cd3f),
+            (0x7c, 0x103),
+            (0x80, 0x0437_f801),
+        ];
+        for (offset, value) in on {
+            registers[offset as usize / 4] = value;
+        }
         Self {
             control: 0x63,
             pll: 0x1000,
             configuration: 0x5,
+            source: 1,
+            switches_at: Picoseconds::MAX,
             registers,
             flags: 0,
             hse_ready_at: Picoseconds::MAX,
@@ -126,7 +146,9 @@ impl Rcc {
                     | flag(self.crystal_is_ready(now), HSE_READY)
                     | flag(self.pll_is_ready(now), PLL_READY)
             }
-            0x08 => self.configuration & !0xc | (self.configuration & 3) << 2,
+            // The trimming of the internal oscillator.
+            0x04 => 0x4000_0000,
+            0x08 => self.configuration & !0xc | self.source << 2,
             0x0c => self.pll,
             0x1c => u32::from(self.nmi) << 8,
             0x94 => self.flags,
@@ -164,9 +186,8 @@ impl Rcc {
         }
     }
 
-    /// Stores the configuration. The bus clock is divided before the system clock rises, and for a microsecond after that.
+    /// Stores the configuration.
     fn configure(&mut self, value: u32, now: Picoseconds) {
-        let was_divided = self.is_divided();
         let is_switch = (self.configuration ^ value) & 3 != 0;
         self.configuration = value;
         let is_ready = match value & 3 {
@@ -175,17 +196,37 @@ impl Rcc {
             _ => self.pll_is_ready(now),
         };
         assert!(is_ready || !is_switch, "the clock is not ready");
-        if self.system_hz() <= UNDIVIDED_HZ {
-            return;
-        }
         if is_switch {
-            assert!(was_divided, "the divider comes first");
-            self.switched_at = now;
+            self.switches_at = now + SWITCH;
         }
+        self.check_divider(now);
+    }
+
+    /// The bus clock is divided before the system clock rises, and for a microsecond after that.
+    fn check_divider(&self, now: Picoseconds) {
         assert!(
-            self.is_divided() || now >= self.switched_at + MICROSECOND,
-            "the divider goes too early"
+            self.system_hz() <= UNDIVIDED_HZ
+                || self.is_divided()
+                || now >= self.switched_at + MICROSECOND,
+            "the divider comes too late or goes too early"
         );
+    }
+
+    /// Returns the time of the next event.
+    pub fn next_event(&self) -> Picoseconds {
+        self.switches_at
+    }
+
+    /// Performs due events; returns whether the system clock has changed.
+    pub fn advance(&mut self, now: Picoseconds) -> bool {
+        let is_due = now >= self.switches_at;
+        if is_due {
+            self.source = self.configuration & 3;
+            self.switches_at = Picoseconds::MAX;
+            self.switched_at = now;
+            self.check_divider(now);
+        }
+        is_due
     }
 
     /// Returns whether the processor's clock is that of the system divided by two or more.
@@ -200,6 +241,8 @@ impl Rcc {
         if self.control & SECURITY_ON != 0 && self.control & HSE_ON != 0 {
             self.nmi = true;
             self.configuration = self.configuration & !3 | 1;
+            self.source = 1;
+            self.switches_at = Picoseconds::MAX;
             self.control &= !(HSE_ON | PLL_ON);
         }
     }
@@ -228,7 +271,7 @@ impl Rcc {
 
     /// Returns the system clock before its divider, Hz; 0 if it has stopped.
     pub fn system_hz(&self) -> u64 {
-        match self.configuration & 3 {
+        match self.source {
             1 => INTERNAL_HZ,
             2 if self.crystal_works => self.crystal_hz,
             3 => self.pll_hz(),

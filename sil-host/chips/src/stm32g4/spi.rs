@@ -3,9 +3,8 @@
 
 use std::collections::VecDeque;
 
-use crate::Transfer;
-
-use crate::{Picoseconds, SECOND};
+use crate::stm32::check_spi_words;
+use crate::{Picoseconds, SECOND, Transfer};
 
 const ENABLED: u32 = 1 << 6;
 const MASTER: u32 = 1 << 2;
@@ -117,6 +116,7 @@ impl Spi {
         let sent = self.to_send.drain(..bytes).enumerate();
         let value = sent.fold(0, |word, (n, byte)| word | u16::from(byte) << (8 * n));
         let [control, _] = self.control;
+        check_spi_words(self.control);
         let divisor = 2_u64 << (control >> 3 & 7);
         let transfer = Transfer {
             value,
