@@ -169,13 +169,34 @@ pub(crate) fn terms(correction: &mut EncoderCorrection) -> [(OfJoint, &mut [f32;
 /// unknown.
 pub(crate) fn suppose_drawn(scenario: &mut Scenario) {
     let told_m = told_m(scenario);
-    let drawn_m = prior(scenario, &Drawn::default()).tip_deviation_m();
-    scenario.controller.estimator.tip_deviation_m = setting(libm::hypot(drawn_m, told_m));
+    let prior = prior(scenario, &Drawn::default());
+    let deviation_m = libm::hypot(prior.tip_deviation_m(), told_m);
+    scenario.controller.estimator.tip_deviation_m = setting(deviation_m);
+    let deviation = |parameter: Parameter| prior.deviations[parameter.index()];
     scenario.knowledge = Knowledge {
         source: DRAWN.into(),
         told_m: rounded(told_m),
-        ..Knowledge::default()
+        ..of_geometry(&prior.parameters, deviation)
     };
+}
+
+/// Returns the knowledge of the geometry alone.
+fn of_geometry(parameters: &Parameters, deviation: impl Fn(Parameter) -> f64) -> Knowledge {
+    let deviation = |parameter: Parameter| rounded(deviation(parameter));
+    let larger = |one: OfJoint, other: OfJoint| {
+        [0, 1].map(|joint| deviation(one(joint)).max(deviation(other(joint))))
+    };
+    let [length_1, _] = parameters.link_length_m();
+    let ratio = deviation(Parameter::Ratio) * length_1;
+    let length = deviation(Parameter::Length);
+    Knowledge {
+        encoder_zero_rad: [0, 1].map(|joint| deviation(Parameter::Zero(joint))),
+        encoder_once_rad: larger(Parameter::Sine, Parameter::Cosine),
+        encoder_twice_rad: larger(Parameter::SecondSine, Parameter::SecondCosine),
+        link_length_m: [length, rounded(libm::hypot(length, ratio))],
+        height_m: deviation(Parameter::Height),
+        ..Knowledge::default()
+    }
 }
 
 /// Returns whether a scenario has never been commissioned or identified.
@@ -486,26 +507,15 @@ impl Found {
             let least = RIPPLES * ripple_m_s2 / f64::from(law.normal_force_n).max(1e-3);
             corrected.controller.governor.p_per_kg = rounded(least) as f32;
         }
-        let deviation = |parameter: Parameter| rounded(fit.deviation(parameter));
-        let larger = |one: OfJoint, other: OfJoint| {
-            [0, 1].map(|joint| deviation(one(joint)).max(deviation(other(joint))))
-        };
-        let [length_1, _] = parameters.link_length_m();
-        let ratio = deviation(Parameter::Ratio) * length_1;
-        let length = deviation(Parameter::Length);
         corrected.knowledge = Knowledge {
             source: source.into(),
-            encoder_zero_rad: [0, 1].map(|joint| deviation(Parameter::Zero(joint))),
-            encoder_once_rad: larger(Parameter::Sine, Parameter::Cosine),
-            encoder_twice_rad: larger(Parameter::SecondSine, Parameter::SecondCosine),
-            link_length_m: [length, rounded(libm::hypot(length, ratio))],
-            height_m: deviation(Parameter::Height),
             tip_m: rounded(self.identified.place_deviation_m),
             told_m: rounded(told_m(scenario)),
             off_line_m: rounded(self.identified.off_line_m[1]),
             ripple_m_s2: rounded(ripple_m_s2),
             coulomb_friction_nm,
             stiffness_nm_rad,
+            ..of_geometry(parameters, |parameter| fit.deviation(parameter))
         };
         painleve_shared::settings::Settings::validate(&corrected)?;
         Ok(corrected)

@@ -56,7 +56,7 @@ fn a_rehearsal_writes_what_it_has_found() {
 fn an_arm_that_has_changed_since_it_was_identified_is_told() {
     let bench = Bench::new("identify-again");
     bench.report(&["identify", "--rehearse", "--seed", "3", "--json"]);
-    let has_changed = |seed: &str, length: &[&str]| {
+    let changes = |seed: &str, length: &[&str]| {
         let line = [
             "identify",
             "out/rehearsed.toml",
@@ -65,14 +65,23 @@ fn an_arm_that_has_changed_since_it_was_identified_is_told() {
             "out/rehearsed-again.toml",
             "--seed",
             seed,
+            "--json",
         ];
-        let again = bench.run(&[&line[..], length].concat());
-        assert!(again.status.success(), "{}", errors(&again));
-        errors(&again).contains("the arm has changed")
+        let report = bench.report(&[&line[..], length].concat());
+        let page = std::fs::read_to_string(bench.path("out/rehearsed.html")).unwrap();
+        let changes: Vec<String> = serde_json::from_value(report["changes"].clone()).unwrap();
+        assert_eq!(page.matches("Warning: ").count(), changes.len());
+        changes
     };
-    assert!(has_changed("4", &[]));
-    assert!(!has_changed("3", &[]));
-    assert!(!has_changed("3", &["--link-1-m", "0.2105"]));
+    let other_arm = changes("4", &[]);
+    for change in ["the arm has changed: ", "the spring of "] {
+        assert!(
+            other_arm.iter().any(|it| it.starts_with(change)),
+            "{other_arm:?}"
+        );
+    }
+    assert_eq!(changes("3", &[]), [""; 0]);
+    assert_eq!(changes("3", &["--link-1-m", "0.2105"]), [""; 0]);
 }
 
 #[test]

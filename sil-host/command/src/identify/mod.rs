@@ -16,7 +16,7 @@ use painleve_commission::identification::{
 use painleve_commission::set_down::{SetDown, advice};
 use painleve_commission::simulated::{GeometryMistake, SimulatedSlides, imperfect};
 use painleve_files::atomic_file::{commit_all, prepare};
-use painleve_identify::parameters::Drawn;
+use painleve_identify::parameters::{Drawn, JOINT_NAMES};
 use painleve_identify::{Parameters, Slide};
 use painleve_plant::decimal::as_written;
 use painleve_plant::scenario::{Knowledge, Scenario, ScenarioError, built_in};
@@ -38,7 +38,7 @@ const MEASURED_M: f64 = 1e-4;
 /// Lengths that a scenario's `arm.link_length_m` may have, m.
 const LINK_LENGTH_M: RangeInclusive<f64> = 0.01..=10.0;
 
-/// Standard deviations of a drawing's length from which a measured one is suspicious.
+/// Standard deviations by which a value differs from another one if this is no chance.
 const TOLERANCE: f64 = 3.0;
 
 /// A later distance from the line beyond this multiple of the one written down shows that the arm has changed.
@@ -132,21 +132,24 @@ pub fn run(arguments: &IdentifyArguments) -> Result<(), CommandError> {
     let warn_of_earlier = |_: &CommandError| warn_of_earlier(&[&output_path, &html_path]);
     let found = found(arguments, &slides, &scenario, &drawn);
     let (found, source) = found.inspect_err(warn_of_earlier)?;
-    warn_of_change(&scenario, &written, &found);
+    let changes = changes(&scenario, &written, &found);
+    for change in &changes {
+        warn(change);
+    }
     let identified = found.applied_to(&scenario, &source);
     let identified = identified
         .map_err(CommandError::Geometry)
         .inspect_err(warn_of_earlier)?;
     let text = identified.to_commented_toml();
     let place = advice(&identified).map_err(|error| range(&arguments.scenario, error))?;
-    let page = report::html(&identified.name, &found, &place);
+    let page = report::html(&identified.name, &found, &changes, &place);
     commit_all(vec![
         prepare(&output_path, text.as_bytes()).map_err(output)?,
         prepare(&html_path, page.as_bytes()).map_err(output)?,
     ])
     .map_err(output)?;
     let written = [output_path, html_path].map(|path| path.display().to_string());
-    report(arguments, &found, &identified, &place, &written)
+    report(arguments, &found, &changes, &identified, &place, &written)
 }
 
 /// Warns if a measured length differs from that of the scenario by more than a drawing's tolerance explains: all positions
@@ -220,32 +223,66 @@ fn failed<E: std::error::Error>(
     }
 }
 
-/// Warns if an arm that has been identified before is no longer as `written` in its scenario. A length that was measured since
-/// is no change of the arm.
-fn warn_of_change(scenario: &Scenario, written: &Parameters, found: &Found) {
-    let written_m = scenario.knowledge.off_line_m;
+/// Returns in what an arm that has been identified before is no longer as `written` in its scenario. A length that was measured
+/// since is no change of the arm.
+fn changes(scenario: &Scenario, written: &Parameters, found: &Found) -> Vec<String> {
+    let knowledge = &scenario.knowledge;
+    let mut changes = Vec::new();
+    let written_m = knowledge.off_line_m;
     let now_m = found.identified.points.off_line_m(written);
     if written_m > 0.0 && now_m > CHANGED * written_m {
-        warn(format_args!(
+        changes.push(format!(
             "the arm has changed: by the scenario's values the tip is {:.2} mm off the line, where {:.2} mm were left when \
              they were measured ({})",
             1e3 * now_m,
             1e3 * written_m,
-            scenario.knowledge.source
+            knowledge.source
         ));
     }
+    let arm = scenario.controller_configuration().arm;
+    for (joint, name) in JOINT_NAMES.iter().enumerate() {
+        let now = &found.joints.joints[joint];
+        for (what, unit, before, deviation, now) in [
+            (
+                "friction",
+                "N·m",
+                arm.coulomb_friction_nm[joint],
+                knowledge.coulomb_friction_nm[joint],
+                now.friction_nm,
+            ),
+            (
+                "spring",
+                "N·m/rad",
+                arm.stiffness_nm_rad[joint],
+                knowledge.stiffness_nm_rad[joint],
+                now.stiffness_nm_rad,
+            ),
+        ] {
+            let change = now.value - as_written(before);
+            // What has never been measured has no deviation.
+            if deviation > 0.0 && change.abs() > TOLERANCE * deviation.hypot(now.deviation) {
+                changes.push(format!(
+                    "the {what} of {name} has changed from {before:.3} ± {deviation:.3} to {:.3} ± {:.3} {unit}",
+                    now.value, now.deviation
+                ));
+            }
+        }
+    }
+    changes
 }
 
-/// Prints what was found, where it is written, and the `place` where the identified arm may be set down.
+/// Prints what was found and has changed, where it is written, and the `place` where the identified arm may be set down.
 fn report(
     arguments: &IdentifyArguments,
     found: &Found,
+    changes: &[String],
     identified: &Scenario,
     place: &str,
     [output, html]: &[String; 2],
 ) -> Result<(), CommandError> {
     if arguments.json {
         let mut object = report::json(found);
+        object["changes"] = changes.into();
         object["output"] = output.as_str().into();
         object["html"] = html.as_str().into();
         for (key, posture) in [

@@ -30,11 +30,14 @@ pub fn text(found: &Found) -> String {
     text + &terminal::readable(sentences(found).join("\n"))
 }
 
-/// Returns the result as a page, with the `place` where the tip may be set down.
-pub fn html(name: &str, found: &Found, place: &str) -> String {
+/// Returns the result as a page, with what has `changed` and the `place` where the tip may be set down.
+pub fn html(name: &str, found: &Found, changed: &[String], place: &str) -> String {
     let mut body = String::new();
-    for sentence in sentences(found).iter().map(String::as_str).chain([place]) {
+    for change in changed {
         // Writing to a string does not fail.
+        let _ = write!(body, "<p>Warning: {}.</p>", escaped(change));
+    }
+    for sentence in sentences(found).iter().map(String::as_str).chain([place]) {
         let _ = write!(body, "<p>{}</p>", escaped(sentence));
     }
     for Table { header, rows } in [geometry(found), joints(found)] {

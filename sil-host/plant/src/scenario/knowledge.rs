@@ -6,8 +6,8 @@ use painleve_shared::settings;
 const REHEARSAL: &str = "rehearsal";
 
 settings! {
-    /// Standard deviations of an arm's geometry and joints, as `painleve identify` has written them: a record of how the arm is
-    /// known. The values are in `arm_model` and `controller.estimator.encoders`. The controller needs what follows from
+    /// Standard deviations of an arm's geometry and joints, as `painleve commission` and `identify` have written them: a record of
+    /// how the arm is known. The values are in `arm_model` and `controller.estimator.encoders`. The controller needs what follows from
     /// them for the tip, `controller.estimator.tip_deviation_m`.
     pub struct Knowledge {
         /// Where values and deviations come from.
