@@ -1,16 +1,22 @@
 //! Injects random faults at random instructions.
 
 use painleve_chips::stm32::Crystal;
-use painleve_chips::{BitErrors, BridgeFailure};
-use painleve_flash_image::bench::{Bench, scenario, with_one_sensor};
-use painleve_flash_image::board::{BoardChip, F405, G474};
+use painleve_chips::{BitErrors, BridgeFailure, MICROSECOND};
+use painleve_flash_image::bench::{Bench, encoded, scenario, with_one_sensor};
+use painleve_flash_image::board::{BoardChip, F405, G474, STAGES_READY};
+use painleve_flash_image::harm::Harm;
+use painleve_plant::law_choice::build;
 use painleve_plant::scenario::Scenario;
-use painleve_shared::mounting::SensorParts;
+use painleve_shared::message::{FrameSource, Request};
+use painleve_shared::mounting::{Mounting, SensorParts};
 
 /// Number of faults of the ignored tests.
 const FAULTS: u32 = 1000;
 
 const DEFAULT: &str = "hybrid-elbow-down";
+
+/// How long the host may be silent, ticks.
+const HOST_LIMIT_TICKS: u32 = 200;
 
 /// Marsaglia's xorshift.
 struct Random(u64);
@@ -31,15 +37,21 @@ enum InjectedFault {
     ResetPin,
     EnableGlitch,
     BadInstruction,
+    UnexpectedInterrupt,
+    StoreToProgram,
     StackOverflow,
     Hang,
     ControlTimer,
     Crystal,
     Supply,
+    StageNotReady,
+    HostSilent,
+    RefusedConfiguration,
     EncoderDies,
     ForceCellDies,
     ForceAxisDies,
     ForceCellSticks,
+    EncoderFreezes,
     SecondEncoderDies,
     SecondForceCellDies,
 }
@@ -52,11 +64,16 @@ impl InjectedFault {
         Self::ResetPin,
         Self::EnableGlitch,
         Self::BadInstruction,
+        Self::UnexpectedInterrupt,
+        Self::StoreToProgram,
         Self::StackOverflow,
         Self::Hang,
         Self::ControlTimer,
         Self::Crystal,
         Self::Supply,
+        Self::StageNotReady,
+        Self::HostSilent,
+        Self::RefusedConfiguration,
         Self::EncoderDies,
         Self::ForceCellDies,
         Self::ForceAxisDies,
@@ -65,6 +82,7 @@ impl InjectedFault {
     /// With two sensors on each channel: those of the second ones, and those that only two show.
     const OF_SECOND_SENSORS: &[Self] = &[
         Self::ForceCellSticks,
+        Self::EncoderFreezes,
         Self::SecondEncoderDies,
         Self::SecondForceCellDies,
     ];
@@ -102,6 +120,11 @@ impl InjectedFault {
                 board.enable(true);
             }
             Self::BadInstruction => drop(board.machine.execute_undefined()),
+            Self::UnexpectedInterrupt => board.machine.raise_unexpected(),
+            Self::StoreToProgram => {
+                let program = board.machine.symbol("main").expect("a program") & !3;
+                board.machine.store(program);
+            }
             Self::StackOverflow => board.machine.recurse(),
             Self::Hang => board.machine.hang(),
             Self::ControlTimer => board.machine.chip_mut().stop_control_timer(),
@@ -109,6 +132,25 @@ impl InjectedFault {
             Self::Supply => {
                 let millivolts = 1500 + random.below(1350) as u32;
                 board.machine.chip_mut().set_supply(millivolts);
+            }
+            Self::StageNotReady => bench.drive_pin(STAGES_READY, Some(false)),
+            Self::HostSilent => {
+                // Its limit counts from now.
+                board.send(&Request::Alive);
+                bench.host_is_there = false;
+            }
+            Self::RefusedConfiguration => {
+                let mut configuration = encoded(&scenario(DEFAULT));
+                // The control rate is the first field of the configuration.
+                configuration[..4].copy_from_slice(&f32::NAN.to_le_bytes());
+                board.send(&Request::Configure {
+                    build: build(),
+                    source: FrameSource::Sensors,
+                    configuration: &configuration,
+                });
+                while !board.machine.chip().usart().incoming.is_empty() {
+                    board.machine.run_for(5 * MICROSECOND);
+                }
             }
             Self::EncoderDies => {
                 let encoder = random.below(2) as usize;
@@ -135,6 +177,14 @@ impl InjectedFault {
                 }
                 bench.present();
             }
+            Self::EncoderFreezes => {
+                let encoder = random.below(2) as usize;
+                if random.below(2) == 0 {
+                    bench.is_frozen[encoder] = true;
+                } else {
+                    bench.second_is_frozen[encoder] = true;
+                }
+            }
             Self::SecondEncoderDies => {
                 let encoder = random.below(2) as usize;
                 let level = random.below(2) == 0;
@@ -145,6 +195,41 @@ impl InjectedFault {
                 board.wiring().second_force.dead = Some(level);
             }
         }
+    }
+
+    /// Returns whether the board does what it promises: the arm goes on, or the torque is off in time and stays off.
+    fn is_handled<C: BoardChip>(self, bench: &mut Bench<C>) -> bool {
+        if self.is_survived() {
+            for _ in 0..10 {
+                bench.tick();
+            }
+            return bench.board.torque().enabled == Some(true) && bench.board.resets().is_empty();
+        }
+        let is_in_time = match self {
+            // Shown by a turn of the joint beyond the tolerance.
+            Self::EncoderFreezes => {
+                let frozen = [0, 1].map(|it| bench.is_frozen[it] || bench.second_is_frozen[it]);
+                let joint = usize::from(frozen[1]);
+                let angle = |bench: &Bench<C>| i64::from(bench.frame.joints[joint].0);
+                let frozen_at = angle(bench);
+                let tolerance = i64::from(Mounting::default().second_encoder_tolerance);
+                let (_, ticks) = Harm::until_off_counting(bench, 2000, |bench| {
+                    (angle(bench) - frozen_at).abs() > tolerance
+                });
+                ticks <= 2
+            }
+            Self::HostSilent => {
+                let drives = (0..HOST_LIMIT_TICKS - 2).all(|_| {
+                    bench.tick();
+                    bench.board.torque().enabled == Some(true)
+                });
+                bench.tick();
+                bench.tick();
+                drives && bench.time_until_off().is_some()
+            }
+            _ => bench.time_until_off().is_some(),
+        };
+        is_in_time && bench.stays_off(20)
     }
 }
 
@@ -182,6 +267,9 @@ fn take_the_torque_off_or_are_survived<C: BoardChip>(scenario: &Scenario, faults
     let mut exceptions = Vec::new();
     for number in 0..faults {
         bench.restore(&healthy);
+        bench.host_is_there = true;
+        bench.is_frozen = [false; 2];
+        bench.second_is_frozen = [false; 2];
         bench.force_is_stuck_at = None;
         bench.second_force_is_stuck_at = None;
         // Anything that the manuals leave open, within their limits.
@@ -200,14 +288,7 @@ fn take_the_torque_off_or_are_survived<C: BoardChip>(scenario: &Scenario, faults
         let count = random.below(15_000);
         bench.board.machine.run_instructions(count, 1_000_000_000);
         fault.strike(&mut bench, &mut random);
-        let kept = if fault.is_survived() {
-            for _ in 0..10 {
-                bench.tick();
-            }
-            bench.board.torque().enabled == Some(true) && bench.board.resets().is_empty()
-        } else {
-            bench.time_until_off().is_some() && bench.stays_off(20)
-        };
+        let kept = fault.is_handled(&mut bench);
         if !kept {
             exceptions.push((number, fault));
         }
