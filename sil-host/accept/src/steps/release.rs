@@ -2,7 +2,8 @@
 //! program takes part in the measurement.
 //!
 //! With the encoders' line at ground, a tick selects the encoder three times, the second time after the control
-//! interrupt. The timer captures every eighth edge, so that the first one of a tick is among them again and again.
+//! interrupt. The timer captures every eighth edge, so that the first one of a tick is among them again and again. One that is
+//! as late as a usual second one cannot be told from it: the report shows these captures, too.
 
 use painleve_board::Port;
 use painleve_shared::message::{FrameSource, Probe};
@@ -14,7 +15,7 @@ use crate::report::Check;
 /// Ticks after which the capture is read.
 const TICKS: usize = 300;
 
-/// Fewest first edges among them: without the wire there is none, with it some 35.
+/// Fewest first edges among them: without the wire there is none, with it some 70.
 const FEWEST: usize = 15;
 
 /// Time by which the second select of a tick may be earlier than usual, µs.
