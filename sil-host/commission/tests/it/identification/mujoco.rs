@@ -1,6 +1,6 @@
 //! Arms whose mechanics and contact are MuJoCo's are identified, and then slide in closed loops.
 //!
-//! `PAINLEVE_ARMS=20 cargo test --profile verify -p painleve-commission --test identification -- --ignored --nocapture arms_in_mujoco`
+//! `PAINLEVE_ARMS=20 cargo test --profile verify -p painleve-commission --test it -- --ignored --nocapture arms_in_mujoco`
 //! prints the figures of the lab book.
 
 use nalgebra::Vector2;

@@ -105,7 +105,7 @@ impl MujocoArm {
             .map(|(name, value)| format!("{name}={value:?}"));
         let source = concat!(
             env!("CARGO_MANIFEST_DIR"),
-            "/tests/identification/mujoco_rig.py"
+            "/tests/it/identification/mujoco_rig.py"
         );
         let mut program = Command::new(python().unwrap())
             .arg(source)

@@ -1,7 +1,5 @@
 //! Every built-in mistake is found and named, and nothing is found in healthy arms.
 
-#![allow(clippy::unwrap_used)]
-
 use painleve_commission::simulated::{BuiltInMistake, SimulatedError, SimulatedRig, random_arm};
 use painleve_commission::{
     CommissionError, Commissioned, Expected, Mistake, NoSlide, OperatorTask, RawReadings, Rig,

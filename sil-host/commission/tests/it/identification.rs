@@ -1,9 +1,7 @@
 //! Arms as bad as life are identified on their own belts and then slide in closed loops; wrong ones are refused.
 //!
-//! `PAINLEVE_ARMS=100 cargo test --profile verify -p painleve-commission --test identification -- --ignored --nocapture` prints the
+//! `PAINLEVE_ARMS=100 cargo test --profile verify -p painleve-commission --test it -- --ignored --nocapture` prints the
 //! figures of the documentation.
-
-#![allow(clippy::unwrap_used)]
 
 mod mujoco;
 mod mujoco_arm;
