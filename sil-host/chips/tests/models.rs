@@ -331,6 +331,15 @@ fn writing_the_flash_takes_its_longest_time() {
     assert_eq!(is_busy(90 * MICROSECOND), [true, true]);
     assert_eq!(is_busy(99 * MICROSECOND), [true, false]);
     assert_eq!(is_busy(100 * MICROSECOND), [false, false]);
+    // A page of the STM32G474, in the second bank.
+    g474.write(
+        0x4002_2014,
+        4,
+        1 << 16 | 1 << 11 | 126 << 3 | 2,
+        MILLISECOND,
+    );
+    assert!(g474.read(0x4002_2010, 4, 25 * MILLISECOND) & BUSY != 0);
+    assert!(g474.read(0x4002_2010, 4, 26 * MILLISECOND) & BUSY == 0);
 }
 
 /// From the internal oscillator to the crystal.

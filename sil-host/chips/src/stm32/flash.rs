@@ -4,7 +4,7 @@
 use std::collections::BTreeSet;
 use std::sync::Arc;
 
-use crate::{MILLISECOND, Picoseconds};
+use crate::Picoseconds;
 
 /// Keys that open the control register.
 pub const CONTROL_KEYS: [u32; 2] = [0x4567_0123, 0xcdef_89ab];
@@ -58,13 +58,12 @@ pub enum Power {
 }
 
 impl FlashSlots {
-    /// Creates erased slots.
-    pub fn new(length: usize) -> Self {
+    /// Creates erased slots, whose erasure takes this long.
+    pub fn new(length: usize, erasure: Picoseconds) -> Self {
         Self {
             bytes: vec![0xff; length].into(),
             busy_until: 0,
-            // Shorter than in any data sheet, so that tests need not wait.
-            erasure: MILLISECOND,
+            erasure,
             operations_left: None,
             operations: 0,
             changing: None,
@@ -172,7 +171,7 @@ mod tests {
 
     #[test]
     fn what_a_reset_interrupts_is_half_done() {
-        let mut slots = FlashSlots::new(24);
+        let mut slots = FlashSlots::new(24, 1);
         for start in [0, 8] {
             assert_eq!(slots.program(start, &[0; 8], 1), Power::On);
         }

@@ -84,6 +84,9 @@ const OPTION_TIME: Picoseconds = 800 * MILLISECOND;
 /// Longest programming of a word by the data sheet; it usually takes 16 µs.
 const WORD_TIME: Picoseconds = 100 * MICROSECOND;
 
+/// Shorter than in the data sheet, where it takes up to 2 s, so that tests need not wait unless they set it.
+const SHORT_ERASURE: Picoseconds = MILLISECOND;
+
 /// First sector of the slots, and its length.
 const FIRST_SECTOR: u32 = 10;
 const SECTOR: usize = 128 << 10;
@@ -161,7 +164,7 @@ impl<O: Outside> Stm32f4<O> {
             power: [0x4000, 0],
             supply_mv: 3300,
             flash_control: [0, 0, 0, 0, LOCK, USUAL_OPTIONS, 0, 0],
-            slots: FlashSlots::new(Self::SLOTS.1),
+            slots: FlashSlots::new(Self::SLOTS.1, SHORT_ERASURE),
             flash_errors: 0,
             programmed_options: USUAL_OPTIONS,
             loaded_options: USUAL_OPTIONS,

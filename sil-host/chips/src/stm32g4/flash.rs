@@ -25,7 +25,10 @@ const USUAL_OPTIONS: u32 = 0xffef_fcaa;
 
 /// Longest programming of the option bytes: the manual gives no time. A page takes up to 25 ms to erase, and both banks
 /// have one.
-const OPTION_TIME: Picoseconds = 50 * MILLISECOND;
+const OPTION_TIME: Picoseconds = 2 * ERASURE;
+
+/// Longest erasure of a page.
+const ERASURE: Picoseconds = 25 * MILLISECOND;
 
 /// Longest programming of a double word; it usually takes 82 µs.
 const DOUBLE_WORD_TIME: Picoseconds = 91 * MICROSECOND;
@@ -73,7 +76,7 @@ impl Flash {
         Self {
             registers,
             keys: [0; 2],
-            slots: FlashSlots::new(SLOTS),
+            slots: FlashSlots::new(SLOTS, ERASURE),
             written_options: USUAL_OPTIONS,
             programmed_options: USUAL_OPTIONS,
             options_busy_until: 0,
