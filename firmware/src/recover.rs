@@ -26,7 +26,7 @@ const DESCENT: f32 = 0.25;
 /// Depth below the belt to which the tip is sent until contact is detected, m.
 const DEEPEST_M: f32 = 0.03;
 /// Factor on the landing speed below the assumed belt: a tip that gets there shows that the links are
-/// shorter.
+/// shorter. Slower, and raised without limit, fewer captures succeeded (lab book, *Constants that are not needed*).
 const SEARCHING: f32 = 4.0;
 /// Rate at which the landing point moves inwards while the path is out of reach, 1/s.
 const INWARDS_PER_S: f32 = 0.5;

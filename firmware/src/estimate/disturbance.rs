@@ -15,7 +15,8 @@ use painleve_shared::{GeneralisedTorque, JointTorque, LinkMotion, Real, settings
 use crate::estimate::model::Model;
 use crate::schedule::Turn;
 
-/// Largest fraction of the residual adopted at once, per unit of p/Q22.
+/// Largest fraction of the residual adopted at once, per unit of p/Q22. By the contact's response alone, fewer
+/// runs were kept (lab book, *Parts of the friction estimate left out*).
 const SHARE: f32 = 0.1;
 /// Largest disturbance of either link, as a part of the largest torque.
 const LARGEST: f32 = 0.2;

@@ -20,7 +20,8 @@ use painleve_shared::{Real, Slip, settings};
 use super::contact::ContactSettings;
 
 /// Square of the number of standard deviations by which a reading that is not noise differs: of another μ or, below the
-/// estimate, of a tip that may stick.
+/// estimate, of a tip that may stick. This one threshold did as well as the rules it replaced (lab book, *Parts of the friction
+/// estimate left out*).
 const DIFFERENT_SQUARE: f32 = 64.0;
 
 /// Fraction of the estimated friction that indicates a slip in the opposite direction.
@@ -42,7 +43,7 @@ const MEAN_S: f32 = 0.02;
 const SIGNIFICANT_SQUARE: f32 = 14.0;
 
 /// Largest square of a change of the innovation that counts as noise, as a multiple of the noise's. A sudden
-/// change of μ is not noise: counted as such, it would hide the next one.
+/// change of μ is not noise: counted as such, it would hide the next one. No campaign shows it, a test does.
 const NOISE_JUMP: f32 = 16.0;
 /// Ticks for which the torque misses a sudden change of μ: on average half a tick until a reading shows it,
 /// and one until the torque that it causes acts.

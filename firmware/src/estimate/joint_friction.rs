@@ -5,9 +5,10 @@
 
 use painleve_shared::{GeneralisedTorque, JointMotion, JointTorque, Real};
 
-/// Travel of a joint over which its Coulomb friction reverses, rad.
+/// Travel of a joint over which its Coulomb friction reverses, rad. Half and twice of it kept fewer runs (lab book,
+/// *Friction and gears of the joints*).
 const TRAVEL_RAD: f32 = 1e-3;
-/// Fraction of the known Coulomb friction that is compensated.
+/// Fraction of the known Coulomb friction that is compensated. All of it kept fewer runs (the same).
 const COMPENSATED: f32 = 0.85;
 
 /// Model of both joints' Coulomb friction.

@@ -36,9 +36,10 @@ const DEVIATIONS: f32 = 3.0;
 /// Lower bound of the response above which the contact is taken to be rigid, and the observers have their full gain.
 const RIGID: f32 = 0.5;
 /// Part of what the contact allows that each loop through it takes. They add up: friction observer, disturbance estimate,
-/// integral of the force.
+/// integral of the force. Equal parts kept as many runs as unequal ones, and more on a hanging belt (lab book, *Constants that
+/// are not needed*).
 const EACH_LOOP: f32 = 1.0 / 3.0;
-/// Number of delays between torque and force that are considered, in ticks.
+/// Number of delays between torque and force that are considered, in ticks. With two the torque was noisier (the same).
 const DELAYS: usize = 3;
 /// Ticks of one block of sums. After a block, averages and bounds are updated in the next two ticks with
 /// spare time, so that no tick does all of it.
@@ -47,7 +48,7 @@ const BLOCK_TICKS: u8 = 15;
 const END_TICKS: u8 = BLOCK_TICKS + 2;
 /// Ticks from one block to the next, if every other tick has spare time.
 const PERIOD_TICKS: u8 = BLOCK_TICKS + 3;
-/// The law damps a contact if the upper bound of its response is below this part of [`RIGID`].
+/// The law damps a contact if the upper bound of its response is below this part of [`RIGID`]. With more the torque was noisier (the same).
 const DAMPED: f32 = 0.4;
 /// Time in contact before the correlation starts: a contact that lasts longer is not a bounce, s.
 pub const SETTLING_S: f32 = 0.05;

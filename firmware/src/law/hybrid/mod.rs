@@ -25,7 +25,7 @@ use super::{Law, LawInput, LawOutput};
 /// Largest correction by the integral of the force, as a part of f_n*.
 const FORCE_INTEGRAL_PART: f32 = 0.5;
 /// Part of the friction observer's rate that a compliant contact takes away. With 0.7, more belts that hang on 10⁴ N/m
-/// ring.
+/// ring (lab book, *Torque*).
 const CALMER_OBSERVER: f32 = 0.85;
 
 /// Rate of change of the force above which the law damps a compliant contact, rad/s.
