@@ -219,7 +219,7 @@ fn is_refused_with_a_reason<C: BoardChip>() {
 #[test]
 #[ignore = "takes longer than 20 s"]
 fn a_stored_configuration_drives_the_arm_without_a_host() {
-    drives_the_arm_without_a_host::<F405>(SECOND);
+    drives_the_arm_without_a_host::<F405>(2 * SECOND);
     drives_the_arm_without_a_host::<G474>(25 * MILLISECOND);
 }
 
