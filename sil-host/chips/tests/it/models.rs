@@ -1,7 +1,5 @@
 //! The chips' models by themselves: nothing that an image does wrong may pass here.
 
-#![allow(clippy::unwrap_used)]
-
 use std::ops::Range;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
