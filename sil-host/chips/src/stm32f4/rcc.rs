@@ -1,6 +1,7 @@
 //! Reset and clock control (RM0090, section 7).
 
 use crate::machine::Reset;
+use crate::stm32::SystemClock;
 use crate::{MICROSECOND, MILLISECOND, Picoseconds};
 
 const HSE_ON: u32 = 1 << 16;
@@ -21,18 +22,13 @@ const CRYSTAL_START: Picoseconds = 2 * MILLISECOND;
 /// Longest time until the phase-locked loop has settled.
 const LOCK: Picoseconds = 300 * MICROSECOND;
 
-/// Time until the system clock is another one. The manual gives none, but flags that tell.
-const SWITCH: Picoseconds = 2 * MICROSECOND;
-
 /// Registers of the clock control.
 #[derive(Clone, Debug)]
 pub struct Rcc {
     control: u32,
     pll: u32,
     configuration: u32,
-    /// The system clock, and when it becomes that of the configuration.
-    source: u32,
-    switches_at: Picoseconds,
+    clock: SystemClock,
     interrupts: u32,
     registers: [u32; 32],
     flags: u32,
@@ -66,8 +62,7 @@ impl Rcc {
             control: 0x83,
             pll: 0x2400_3010,
             configuration: 0,
-            source: 0,
-            switches_at: Picoseconds::MAX,
+            clock: SystemClock::new(0),
             interrupts: 0,
             registers,
             flags: 0,
@@ -129,7 +124,7 @@ impl Rcc {
                 self.control & !(HSE_READY | PLL_READY) | ready | locked
             }
             0x04 => self.pll,
-            0x08 => self.configuration & !0xc | self.source << 2,
+            0x08 => self.configuration & !0xc | self.clock.source() << 2,
             0x0c => self.interrupts | u32::from(self.nmi) << 7,
             0x74 => self.flags | self.registers[0x1d] & 1 | (self.registers[0x1d] & 1) << 1,
             0x10..0x80 => self.registers[(offset / 4) as usize],
@@ -169,7 +164,7 @@ impl Rcc {
                 let is_switch = (self.configuration ^ value) & 3 != 0;
                 assert!(is_ready || !is_switch, "the clock is not ready");
                 if is_switch {
-                    self.switches_at = now + SWITCH;
+                    self.clock.switch(now);
                 }
                 self.configuration = value;
             }
@@ -192,17 +187,12 @@ impl Rcc {
 
     /// Returns the time of the next event.
     pub fn next_event(&self) -> Picoseconds {
-        self.switches_at
+        self.clock.next_event()
     }
 
     /// Performs due events; returns whether the system clock has changed.
     pub fn advance(&mut self, now: Picoseconds) -> bool {
-        let is_due = now >= self.switches_at;
-        if is_due {
-            self.source = self.configuration & 3;
-            self.switches_at = Picoseconds::MAX;
-        }
-        is_due
+        self.clock.advance(self.configuration & 3, now)
     }
 
     /// Stops the crystal; with the clock security system on, the processor continues on the
@@ -212,8 +202,7 @@ impl Rcc {
         if self.control & SECURITY_ON != 0 && self.control & HSE_ON != 0 {
             self.nmi = true;
             self.configuration &= !3;
-            self.source = 0;
-            self.switches_at = Picoseconds::MAX;
+            self.clock = SystemClock::new(0);
             self.control &= !(HSE_ON | PLL_ON);
         }
     }
@@ -239,7 +228,7 @@ impl Rcc {
 
     /// Returns the system clock before its dividers, Hz; 0 if it has stopped.
     fn system_hz(&self) -> u64 {
-        match self.source {
+        match self.clock.source() {
             0 => INTERNAL_HZ,
             1 if self.crystal_works => self.crystal_hz,
             1 => 0,

@@ -1,6 +1,7 @@
 //! Reset and clock control (RM0440, chapter RCC).
 
 use crate::machine::Reset;
+use crate::stm32::SystemClock;
 use crate::{MICROSECOND, MILLISECOND, Picoseconds};
 
 const HSE_ON: u32 = 1 << 16;
@@ -37,18 +38,13 @@ const UNDIVIDED_HZ: u64 = 80_000_000;
 /// Longest time until the phase-locked loop has settled.
 const LOCK: Picoseconds = 40 * MICROSECOND;
 
-/// Time until the system clock is another one. The manual gives none, but flags that tell.
-const SWITCH: Picoseconds = 2 * MICROSECOND;
-
 /// Registers of the clock control.
 #[derive(Clone, Debug)]
 pub struct Rcc {
     control: u32,
     pll: u32,
     configuration: u32,
-    /// The system clock, and when it becomes that of the configuration.
-    source: u32,
-    switches_at: Picoseconds,
+    clock: SystemClock,
     registers: [u32; 40],
     flags: u32,
     hse_ready_at: Picoseconds,
@@ -85,8 +81,7 @@ impl Rcc {
             control: 0x63,
             pll: 0x1000,
             configuration: 0x5,
-            source: 1,
-            switches_at: Picoseconds::MAX,
+            clock: SystemClock::new(1),
             registers,
             flags: 0,
             hse_ready_at: Picoseconds::MAX,
@@ -148,7 +143,7 @@ impl Rcc {
             }
             // The trimming of the internal oscillator.
             0x04 => 0x4000_0000,
-            0x08 => self.configuration & !0xc | self.source << 2,
+            0x08 => self.configuration & !0xc | self.clock.source() << 2,
             0x0c => self.pll,
             0x1c => u32::from(self.nmi) << 8,
             0x94 => self.flags,
@@ -197,7 +192,7 @@ impl Rcc {
         };
         assert!(is_ready || !is_switch, "the clock is not ready");
         if is_switch {
-            self.switches_at = now + SWITCH;
+            self.clock.switch(now);
         }
         self.check_divider(now);
     }
@@ -214,19 +209,17 @@ impl Rcc {
 
     /// Returns the time of the next event.
     pub fn next_event(&self) -> Picoseconds {
-        self.switches_at
+        self.clock.next_event()
     }
 
     /// Performs due events; returns whether the system clock has changed.
     pub fn advance(&mut self, now: Picoseconds) -> bool {
-        let is_due = now >= self.switches_at;
-        if is_due {
-            self.source = self.configuration & 3;
-            self.switches_at = Picoseconds::MAX;
+        let has_switched = self.clock.advance(self.configuration & 3, now);
+        if has_switched {
             self.switched_at = now;
             self.check_divider(now);
         }
-        is_due
+        has_switched
     }
 
     /// Returns whether the processor's clock is that of the system divided by two or more.
@@ -241,8 +234,7 @@ impl Rcc {
         if self.control & SECURITY_ON != 0 && self.control & HSE_ON != 0 {
             self.nmi = true;
             self.configuration = self.configuration & !3 | 1;
-            self.source = 1;
-            self.switches_at = Picoseconds::MAX;
+            self.clock = SystemClock::new(1);
             self.control &= !(HSE_ON | PLL_ON);
         }
     }
@@ -271,7 +263,7 @@ impl Rcc {
 
     /// Returns the system clock before its divider, Hz; 0 if it has stopped.
     pub fn system_hz(&self) -> u64 {
-        match self.source {
+        match self.clock.source() {
             1 => INTERNAL_HZ,
             2 if self.crystal_works => self.crystal_hz,
             3 => self.pll_hz(),

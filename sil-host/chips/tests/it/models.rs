@@ -43,20 +43,16 @@ fn check_after_reset<C: WiredChip<Outside = Nothing>>(clocks: &[u32], except: &[
         .after_reset()
         .partition::<Vec<_>, _>(|(address, _)| clocks.contains(address));
     let mut differ = Vec::new();
-    for (address, value) in own {
-        let is = chip.read(address, 4, 0);
-        if is != value {
-            differ.push(format!("{address:#x} is {is:#x}, not {value:#x}"));
-        }
-        chip.write(address, 4, u32::MAX, 0);
-    }
-    for (address, value) in others {
+    for (address, value) in own.into_iter().chain(others) {
         if except.iter().any(|it| it.contains(&address)) {
             continue;
         }
         let is = chip.read(address, 4, 0);
         if is != value {
             differ.push(format!("{address:#x} is {is:#x}, not {value:#x}"));
+        }
+        if clocks.contains(&address) {
+            chip.write(address, 4, u32::MAX, 0);
         }
     }
     assert!(differ.is_empty(), "{differ:#?}");

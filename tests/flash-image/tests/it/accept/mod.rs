@@ -65,11 +65,11 @@ fn board<C: BoardChip>(seed: u64, defect: Option<Defect>) -> EmulatedPort<C> {
 
 fn acceptance<C: BoardChip>(seed: u64, defect: Option<Defect>) -> Acceptance {
     acceptance_of(board::<C>(seed, defect))
+        .unwrap_or_else(|error| panic!("seed {seed}, {defect:?}: {error}"))
 }
 
-fn acceptance_of<C: BoardChip>(board: EmulatedPort<C>) -> Acceptance {
+fn acceptance_of<C: BoardChip>(board: EmulatedPort<C>) -> Result<Acceptance, AcceptError> {
     accept(Serial::over(board).unwrap(), |_| ControlFlow::Continue(()))
-        .unwrap_or_else(|error| panic!("{error}"))
 }
 
 /// Returns what a check of a step has measured.
@@ -127,7 +127,7 @@ fn a_healthy_board_is_accepted() {
 fn a_healthy_board_with_a_slow_erasure_is_accepted() {
     let mut port = board::<F405>(FIRST_SEED, None);
     port.board.machine.chip_mut().slots_mut().erasure = SECOND;
-    let acceptance = acceptance_of(port);
+    let acceptance = acceptance_of(port).unwrap();
     assert_eq!(failures(&acceptance), [""; 0]);
     let cuts = measured(&acceptance, "flash", "resets that interrupted");
     assert_eq!(cuts, "6");
