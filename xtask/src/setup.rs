@@ -17,7 +17,7 @@ const UNICORN: &str = "unicorn==2.1.4";
 /// Options of `cargo xtask setup`.
 #[derive(Debug, Args)]
 pub struct SetupArguments {
-    /// Also install what `cargo xtask test --all` uses: browser, Python environments, libclang, C++, the least Rust version.
+    /// Also install what `cargo xtask test --all` uses: Chromium, Node, Python's `venv`, libclang, C++, librsvg, the least Rust version.
     #[arg(long)]
     all: bool,
     /// Install Debian packages with sudo.
