@@ -3,6 +3,9 @@
 //!
 //! The handlers make only async-signal-safe calls. There is no thread that could fail to start or
 //! react late.
+//!
+//! `signal-hook` would set the flag, but neither leaves ignored signals ignored, as under `nohup`, nor gives
+//! children the default actions back.
 
 use std::io;
 use std::sync::Arc;

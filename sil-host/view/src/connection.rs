@@ -1,5 +1,8 @@
 //! A connection until it is answered or becomes a WebSocket: the request and the answer together have one
 //! deadline, however slowly their bytes come.
+//!
+//! The head is parsed by `tungstenite`. `tiny_http` starts threads of its own and hands out an upgraded stream whose
+//! timeouts cannot be set. The server of the Foxglove SDK serves no page, checks neither token nor origin, and needs `tokio`.
 
 use std::io::{self, ErrorKind, Read, Write};
 use std::net::TcpStream;

@@ -2,7 +2,8 @@
 //! watchdogs.
 //!
 //! It uses the registers of `stm32g4` instead of `stm32g4xx-hal` 0.1.0, whose start of the clocks waits without
-//! a limit and panics, and which resets a port before it configures its pins.
+//! a limit and panics, and which resets a port before it configures its pins. `stm32f4xx-hal`, which the other board
+//! uses, knows no STM32G4.
 
 #![no_std]
 #![cfg(target_os = "none")]
