@@ -115,8 +115,10 @@ fn a_negative_number_is_refused_by_its_option() {
 }
 
 #[test]
-fn outputs_that_cannot_be_written_are_refused_before_the_run() {
+fn outputs_that_cannot_be_written_are_refused_before_anything_is_computed() {
     let bench = Bench::new("output");
+    let study = ["study", "regions", "--svg", "/proc/nowhere/x.svg"];
+    assert_refused(&bench, &study, 4, &["/proc/nowhere"]);
     for option in ["--record", "--plot"] {
         assert_refused(
             &bench,

@@ -490,7 +490,7 @@ fn names_that_are_not_text_are_used_as_they_are() {
 }
 
 #[test]
-fn a_file_size_limit_leaves_no_file_of_a_run() {
+fn a_file_size_limit_is_reported_and_leaves_no_file_of_a_run() {
     let bench = Bench::new("limits");
     // Page and figure of this run are smaller than its table.
     let whole = run(
@@ -514,6 +514,9 @@ fn a_file_size_limit_leaves_no_file_of_a_run() {
             format!("ulimit -f {kib}; $P run edge --set run.duration_s=0.6 --csv out/run.csv");
         let output = bench.shell(&line);
         assert_eq!(code(output.status), 4, "{kib}: {output:?}");
+        let message = errors(&output);
+        assert_eq!(message.trim().lines().count(), 1, "{kib}: {message}");
+        assert!(message.contains("out/run."), "{kib}: {message}");
         assert_eq!(bench.files(), [""; 0], "{kib} KiB");
     }
     // Also of other commands that write several files.

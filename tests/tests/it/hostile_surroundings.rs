@@ -40,16 +40,6 @@ fn a_closed_pipe_is_not_an_error_but_a_full_disk_is() {
 }
 
 #[test]
-fn a_file_size_limit_is_reported_like_a_full_disk() {
-    let bench = Bench::new("fsize");
-    let output = bench.shell("ulimit -f 64; $P run --no-plot");
-    assert_eq!(code(output.status), 4, "{output:?}");
-    assert_eq!(errors(&output).trim().lines().count(), 1, "{output:?}");
-    assert!(errors(&output).contains("run.mcap"), "{output:?}");
-    assert_eq!(bench.files(), [""; 0]);
-}
-
-#[test]
 fn signals_are_handled_while_a_process_waits_for_its_peer() {
     let interrupted = |role: &str, sent: Signal| {
         let bench = Bench::new(&format!("waiting-{role}-{sent}"));

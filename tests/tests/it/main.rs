@@ -19,7 +19,6 @@ mod identification;
 mod json;
 mod live;
 mod processor_in_the_loop;
-mod promises;
 mod python;
 mod ros2;
 mod runs;

@@ -1,9 +1,8 @@
-//! The paper's Figs. 4 and 5 on a coarse grid: where and how the arm bounces, independent of
-//! the number of threads.
+//! The paper's Figs. 4 and 5 on a coarse grid: where and how the arm bounces.
 
 use painleve_plant::mechanics::PlantParameters;
 use painleve_study_core::initial::Initial;
-use painleve_study_core::{Study, outcome, rows};
+use painleve_study_core::{Study, rows};
 use painleve_study_paper::bifurcation::{Bifurcation, BifurcationDiagram};
 use painleve_study_paper::cells::{Cells, RELATIVE_TOLERANCE};
 use painleve_study_paper::chaos::Regime;
@@ -64,29 +63,6 @@ fn nothing_bounces_below_the_critical_friction_or_from_x0_d() {
             .iter()
             .all(|window| window.paper_m_s.is_none())
     );
-}
-
-/// Returns the rows as CSV, computed on this many threads.
-fn csv(threads: usize) -> Vec<u8> {
-    let initial = [Initial::A, Initial::Random(1), Initial::Random(2)];
-    let mut cells = cells(&[0.3, 0.6], &[-0.5, -0.4, -0.2], &initial);
-    (cells.transient_s, cells.record_s) = (8.0, 2.0);
-    let study = Bifurcation { cells };
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
-    let rows = pool.expect("threads").install(|| rows(&study, || ()));
-    let rows = rows.expect("every cell can be computed");
-    // A row can be computed alone.
-    assert_eq!(study.row(13).expect("the row is computed"), rows[13]);
-    outcome::csv(&BifurcationDiagram::new(&study, rows)).expect("flat rows")
-}
-
-#[test]
-fn rows_do_not_depend_on_the_number_of_threads() {
-    let one = csv(1);
-    assert_eq!(one, csv(2));
-    assert_eq!(one, csv(5));
-    let lines = one.iter().filter(|byte| **byte == b'\n').count();
-    assert_eq!(lines, 1 + 2 * 3 * 3);
 }
 
 /// Periodic and chaotic motion far from all bifurcations; the periods double towards −0.49.

@@ -1,4 +1,4 @@
-//! A small campaign, its repeatability and its replay.
+//! A small campaign and its replay.
 
 use clap::ValueEnum;
 use painleve_plant::closed_loop::ClosedLoop;
@@ -28,14 +28,8 @@ pub(super) fn campaign(runs: usize) -> Robustness {
 }
 
 #[test]
-fn rows_do_not_depend_on_threads() {
-    let on = |threads| {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
-        pool.unwrap()
-            .install(|| rows(&campaign(12), || ()).unwrap())
-    };
-    let found = on(1);
-    assert_eq!(found, on(3));
+fn every_run_has_an_ending_and_every_failed_one_is_listed() {
+    let found = rows(&campaign(12), || ()).unwrap();
     let outcome = RobustnessOutcome::new(&campaign(12), found);
     assert_eq!(outcome.endings.values().sum::<usize>(), 12);
     let failed = 12 - outcome.success.successes;
