@@ -23,6 +23,7 @@ mod python;
 mod ros2;
 mod runs;
 mod scarce_resources;
+mod size;
 mod soak;
 mod studies;
 mod sweeps;
