@@ -1,13 +1,10 @@
-//! `cargo xtask examples`: builds, runs and tests every example; each is a crate outside the
-//! workspace.
+//! `cargo xtask examples`: builds, runs and tests every example in Rust.
 
-use std::fs;
-use std::path::{Path, PathBuf};
+use crate::build_fw;
+use crate::command::{ChoreError, run_cargo};
+use crate::under_test::PROFILE;
 
-use crate::command::{ChoreError, run_cargo, workspace};
-use crate::{boards, build_fw};
-
-/// A common target folder of all examples, because they share most dependencies.
+/// Target folder of the firmware that is not ours, which is no member of the workspace.
 const TARGET: &str = "target/examples";
 
 /// A firmware that is not ours, with the controller in it.
@@ -46,8 +43,31 @@ fn own_firmware_for(chips: &[(&str, &str)]) -> Result<(), ChoreError> {
     Ok(())
 }
 
-/// Builds the firmware for all its chips and runs its tests on this machine. Then, for every other folder of `examples/` that
-/// has a `Cargo.toml`, sorted by name: builds the image named by `[package.metadata] image`, runs the program, then its tests.
+/// Builds the image with a law of its own.
+///
+/// # Errors
+/// If it does not build.
+pub fn own_law_image() -> Result<(), ChoreError> {
+    let image = "own-law-f405".to_owned();
+    let selection = [
+        "--profile",
+        build_fw::PROFILE,
+        "--package",
+        "own-law",
+        "--bin",
+        &image,
+    ];
+    build_fw::build(
+        build_fw::TARGET,
+        &selection,
+        "target",
+        build_fw::PROFILE,
+        &[&image],
+    )
+}
+
+/// Builds the firmware for all its chips and runs its tests on this machine; runs the programs with an own law and an own plant,
+/// and their tests.
 ///
 /// # Errors
 /// If an example does not build, ends with an error, or fails a test.
@@ -55,38 +75,11 @@ pub fn run() -> Result<(), ChoreError> {
     own_firmware_for(&CHIPS)?;
     let test = ["test", "--lib", "--target-dir", TARGET];
     run_cargo(&[&test[..], &OF_OWN_FIRMWARE].concat())?;
-    for manifest in manifests()? {
-        let manifest_path = manifest.to_string_lossy();
-        let of_example = ["--locked", "--release", "--manifest-path", &manifest_path];
-        for image in images(&manifest)? {
-            let selection = [&of_example[..], &["--bin", &image]].concat();
-            build_fw::build(build_fw::TARGET, &selection, TARGET, "release", &[&image])?;
-        }
-        for chore in ["run", "test"] {
-            run_cargo(&[&[chore], &of_example[..], &["--target-dir", TARGET]].concat())?;
-        }
+    own_law_image()?;
+    for example in ["own-law", "own-plant"] {
+        let of_example = ["--profile", PROFILE, "--package", example];
+        run_cargo(&[&["run"], &of_example[..]].concat())?;
+        run_cargo(&[&["test"], &of_example[..], &["--", "--include-ignored"]].concat())?;
     }
     Ok(())
-}
-
-/// Returns the microcontroller images of an example.
-fn images(manifest: &Path) -> Result<Vec<String>, ChoreError> {
-    let packages = boards::packages(manifest)?;
-    let image =
-        |package: &serde_json::Value| package["metadata"]["image"].as_str().map(str::to_owned);
-    Ok(packages.iter().filter_map(image).collect())
-}
-
-fn manifests() -> Result<Vec<PathBuf>, ChoreError> {
-    let folder = workspace().join("examples");
-    let error = |cause| ChoreError(format!("cannot read {}: {cause}", folder.display()));
-    let mut manifests = Vec::new();
-    for entry in fs::read_dir(&folder).map_err(error)? {
-        let manifest = entry.map_err(error)?.path().join("Cargo.toml");
-        if manifest.is_file() && !manifest.ends_with(OWN_FIRMWARE) {
-            manifests.push(manifest);
-        }
-    }
-    manifests.sort();
-    Ok(manifests)
 }
