@@ -31,7 +31,7 @@ fn has_least_rust() -> bool {
         .is_ok_and(|status| status.success())
 }
 
-/// Checks that the least Rust version compiles the workspace with its tests, if it is installed.
+/// Checks that the least Rust version compiles what users build, if it is installed; tests may need a newer one.
 ///
 /// # Errors
 /// If it does not.
@@ -39,13 +39,7 @@ pub fn least_rust() -> Result<(), ChoreError> {
     if !has_least_rust() {
         return Ok(());
     }
-    let check = [
-        "check",
-        "--workspace",
-        "--all-targets",
-        "--profile",
-        PROFILE,
-    ];
+    let check = ["check", "--workspace", "--profile", PROFILE];
     run(
         "rustup",
         &[&["run", LEAST_RUST, "cargo"], &check[..]].concat(),

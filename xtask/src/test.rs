@@ -1,7 +1,7 @@
 //! `cargo xtask test`: the tests, in two tiers.
 //!
-//! The default tier has all tests of up to 20 s each, on one of the two chips, and a sample of kills. `--all` adds what takes
-//! longer or requires further tools.
+//! The default tier holds every promise once, on one of the two chips, with a sample of kills: it is for every change. `--all`
+//! adds campaigns, searches and whole procedures, which take seconds to minutes each, and what requires further tools.
 //! The last lines name the tier, what it left out, and why.
 
 use std::fs;
@@ -67,6 +67,9 @@ pub fn run(arguments: &TestArguments) -> Result<(), ChoreError> {
     let missing = setup::install_missing(tools)?;
     build_fw::run()?;
     examples::own_firmware()?;
+    if arguments.all {
+        examples::own_law_image()?;
+    }
     build_program()?;
     size::check_images()?;
     let mut left_out: Vec<String> = missing
@@ -147,6 +150,12 @@ fn workspace_tests(
             "--tests",
         ]
     };
+    // Some tests wait for time-outs: one more at a time than processors keeps these busy.
+    let threads = std::thread::available_parallelism().map_or(2, |count| count.get() + 1);
+    let threads = threads.to_string();
+    if has_nextest {
+        line.extend(["--test-threads", &threads]);
+    }
     match (has_nextest, arguments.all) {
         (true, true) => line.extend(["--run-ignored", "all"]),
         (false, true) => line.extend(["--", "--include-ignored"]),

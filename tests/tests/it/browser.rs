@@ -60,6 +60,7 @@ impl Browser {
 }
 
 #[test]
+#[ignore = "needs a browser"]
 fn the_page_of_a_run_plays_zooms_and_has_no_error() {
     let Some(browser) = Browser::find() else {
         return;
@@ -103,6 +104,7 @@ fn a_page_without_pictures_or_connection_and_one_too_many_lose_nothing_that_matt
 }
 
 #[test]
+#[ignore = "needs a browser"]
 fn the_page_of_a_long_run_is_small() {
     let bench = Bench::new("long-page");
     let options = ["run", "--set", "run.duration_s=60", "--json", "--no-record"];
@@ -112,6 +114,7 @@ fn the_page_of_a_long_run_is_small() {
 }
 
 #[test]
+#[ignore = "needs a browser"]
 fn no_label_of_a_picture_overlaps_another_or_is_cut_off_or_too_small() {
     let Some(browser) = Browser::find() else {
         return;

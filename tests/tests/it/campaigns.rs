@@ -92,7 +92,15 @@ fn a_replayed_run_ends_where_it_did_in_its_campaign() {
         for index in [1, 3] {
             let row = &list(&report["rows"])[index];
             let replay = format!("3:{index}");
-            let line = [&["run", "--replay", &replay, "--json"], changes].concat();
+            let line = [
+                "run",
+                "--replay",
+                &replay,
+                "--no-record",
+                "--no-plot",
+                "--json",
+            ];
+            let line = [&line[..], changes].concat();
             let run = bench.report(&line);
             let apart_m = number(&run["final_tip_t_m"]) - number(&row["tip_t_m"]);
             // The difference is rounding of the last printed digit.
@@ -102,8 +110,16 @@ fn a_replayed_run_ends_where_it_did_in_its_campaign() {
         }
     }
     // Another seed gives another run.
-    let other = bench.report(&["run", "--replay", "4:1", "--json"]);
-    let this = bench.report(&["run", "--replay", "3:1", "--json"]);
+    let [other, this] = ["4:1", "3:1"].map(|replay| {
+        bench.report(&[
+            "run",
+            "--replay",
+            replay,
+            "--no-record",
+            "--no-plot",
+            "--json",
+        ])
+    });
     assert_ne!(other["final_tip_t_m"], this["final_tip_t_m"]);
     assert!(bench.leftovers().is_empty());
 }
@@ -139,6 +155,7 @@ fn an_invalid_replay_is_refused() {
 }
 
 #[test]
+#[ignore = "a campaign"]
 fn an_ablation_has_a_line_for_each_part_and_a_column_for_each_condition() {
     let bench = Bench::new("ablation");
     let all = ["study", "ablation", "--on", "rigid,capture", "--runs", "2"];

@@ -68,6 +68,7 @@ fn the_report_has_the_documented_keys() {
 }
 
 #[test]
+#[ignore = "executes every command of the tutorials"]
 fn the_commands_of_the_tutorials_succeed() {
     let bench = Bench::new("tutorials");
     symlink(workspace().join("examples"), bench.path("examples")).unwrap();

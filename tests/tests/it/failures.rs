@@ -192,14 +192,14 @@ fn one_of_several_simultaneous_runs_succeeds() {
         "--silence-limit-s",
         "20",
     ];
-    let hash = bench.report(&[&["run", "--set", "run.duration_s=100"], &short[..]].concat());
+    let hash = bench.report(&[&["run", "--set", "run.duration_s=40"], &short[..]].concat());
     let rounds = std::env::var("PAINLEVE_ROUNDS").map_or(3, |rounds| rounds.parse().unwrap());
     for round in 0..rounds {
         let count = 2 + round % 4;
         let barrier = Barrier::new(count);
         let outputs: Vec<Output> = std::thread::scope(|scope| {
             let start = || {
-                let fixed = ["run", "--set", "run.duration_s=100", "--bus", &bench.bus];
+                let fixed = ["run", "--set", "run.duration_s=40", "--bus", &bench.bus];
                 let mut command = bench.command(&[&fixed, &short[..]].concat());
                 barrier.wait();
                 command.output().unwrap()

@@ -299,6 +299,7 @@ fn a_board_that_is_gone_ends_the_run_with_a_message() {
 
 /// QEMU's timers count nanoseconds in 32 bits, which last 4.3 s.
 #[test]
+#[ignore = "waits for seconds"]
 fn a_board_idle_for_longer_than_its_timer_counts_is_configured_again() {
     let line = SerialLine::new(LineNoise::None);
     let _board = line.start_board();

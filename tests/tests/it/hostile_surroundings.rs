@@ -339,7 +339,14 @@ fn costs_that_cannot_be_written_at_the_end_of_a_run_end_it_with_the_code_of_outp
 #[test]
 fn an_interrupted_export_leaves_nothing() {
     let bench = Bench::new("export");
-    let recorded = bench.run(&["run", "--set", "run.duration_s=60", "--record", "run.mcap"]);
+    let recorded = bench.run(&[
+        "run",
+        "--set",
+        "run.duration_s=20",
+        "--no-plot",
+        "--record",
+        "run.mcap",
+    ]);
     assert_eq!(code(recorded.status), 0, "{recorded:?}");
     let before = bench.files();
     for format in ["--csv=new.csv", "--ros2=new.mcap"] {

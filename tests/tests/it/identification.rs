@@ -53,6 +53,7 @@ fn a_rehearsal_writes_what_it_has_found() {
 
 /// A link 1 that was measured later is no change.
 #[test]
+#[ignore = "a long identification"]
 fn an_arm_that_has_changed_since_it_was_identified_is_told() {
     let bench = Bench::new("identify-again");
     bench.report(&["identify", "--rehearse", "--seed", "3", "--json"]);
@@ -85,6 +86,7 @@ fn an_arm_that_has_changed_since_it_was_identified_is_told() {
 }
 
 #[test]
+#[ignore = "a long identification"]
 fn a_length_that_no_drawing_explains_is_told() {
     let bench = Bench::new("identify-length");
     let warns = |length_m: &str| {
@@ -138,6 +140,7 @@ fn recorded(bench: &Bench, posture: Posture, name: &str) -> String {
 }
 
 #[test]
+#[ignore = "a long identification"]
 fn records_of_slides_show_an_arm() {
     let bench = Bench::new("identify-records");
     let down = recorded(&bench, Posture::ElbowDown, "elbow-down");

@@ -435,6 +435,7 @@ fn the_log_is_printed_by_defmt_print() {
 
 /// As by Ctrl-Z and fg. The emulator is the first to be stopped and the last to continue, so that its bridge waits for it.
 #[test]
+#[ignore = "waits for seconds"]
 fn the_time_for_which_a_run_is_stopped_is_no_silence_of_the_board() {
     let bench = Bench::new("stopped-together");
     let image = image().to_string_lossy();

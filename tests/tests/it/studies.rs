@@ -318,6 +318,7 @@ fn mistakes_are_reported_in_one_line_and_overwrite_nothing() {
 }
 
 #[test]
+#[ignore = "draws every figure"]
 fn the_page_of_all_figures_is_self_contained() {
     let bench = Bench::new("figures");
     let result = bench.report(&["figures", "--draft", "--out", "page", "--json"]);

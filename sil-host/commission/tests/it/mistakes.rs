@@ -111,6 +111,7 @@ fn every_built_in_mistake_is_found_and_named() {
 }
 
 #[test]
+#[ignore = "a campaign"]
 fn every_mistake_is_found_in_random_arms() {
     let failures: Vec<String> = (FIRST_SEED..FIRST_SEED + 25)
         .flat_map(|seed| {

@@ -49,6 +49,7 @@ fn healthy_arms_are_identified_to_the_limit_and_errors_are_within_three_deviatio
 
 /// Ratio of the tip's errors to the deviations told, root mean square: over arms as different as what is known of them.
 #[test]
+#[ignore = "a campaign"]
 fn the_tip_is_as_far_off_as_its_deviation_says() {
     let mut squares = [(0.0, 0.0); 2];
     for seed in FIRST_SEED..FIRST_SEED + ARMS {

@@ -54,6 +54,7 @@ fn is_named_if_slipping(joint: usize) {
 }
 
 #[test]
+#[ignore = "as that of the elbow"]
 fn a_slipping_coupling_of_joint_1_is_named() {
     is_named_if_slipping(0);
 }

@@ -5,3 +5,4 @@ mod bifurcation;
 mod malformed_input;
 mod options;
 mod page_commands;
+mod page_figures;

@@ -24,6 +24,7 @@ fn study(effects: &[&'static str], runs: usize) -> EffectsStudy {
 }
 
 #[test]
+#[ignore = "draws a thousand scenarios"]
 fn every_effect_at_every_level_is_a_valid_scenario_of_its_own() {
     let all: Vec<_> = EFFECTS.iter().map(|effect| effect.name).collect();
     let study = study(&all, 1);

@@ -60,6 +60,7 @@ fn a_search_improves_gains_that_are_off_and_does_not_depend_on_threads_or_pauses
 }
 
 #[test]
+#[ignore = "a tuning"]
 fn from_gains_off_by_three_the_objective_of_the_built_in_ones_is_found() {
     is_found_from([3.0, 1.0 / 3.0, 3.0]);
 }

@@ -117,6 +117,7 @@ fn an_acceptance_can_be_ended_after_a_step() {
 }
 
 #[test]
+#[ignore = "a whole acceptance"]
 fn a_healthy_board_is_accepted() {
     nothing_is_found::<F405>(1);
 }

@@ -222,6 +222,7 @@ fn configured(scenario: &Scenario) -> FlashedBoard {
 
 /// Built-in scenarios with a simulated arm and frames over the serial line.
 #[test]
+#[ignore = "every scenario, as in QEMU"]
 fn scenarios_stay_below_the_bound() {
     with_bound::<F405>(|watch| {
         for name in built_in::names() {
@@ -334,6 +335,7 @@ fn peripherals_at_addresses_computed_at_run_time_are_those_of_pins() {
 
 /// Frames of a closed loop with random disturbances.
 #[test]
+#[ignore = "a search for the worst tick"]
 fn random_frames_stay_below_the_bound() {
     with_bound::<F405>(|watch| {
         let names: Vec<&str> = built_in::names().collect();
@@ -437,6 +439,7 @@ fn the_worst_settings_found_by_a_search_stay_below_the_bound() {
 /// Random valid settings of the controller, with frames of a closed loop with random disturbances.
 /// The settings depend on their number alone, not on the number of threads.
 #[test]
+#[ignore = "a search for the worst tick"]
 fn random_settings_stay_below_the_bound() {
     let bound = Bound::of(&flashed::<F405>()).unwrap_or_else(|error| panic!("{error}"));
     let settings = tries(800).div_ceil(FRAMES_PER_SETTINGS);

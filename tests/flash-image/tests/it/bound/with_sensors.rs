@@ -22,6 +22,7 @@ fn worst_found() -> Scenario {
 
 /// With the board's own sensors: worst found with the built-in settings and with valid ones.
 #[test]
+#[ignore = "a search for the worst tick"]
 fn the_worst_readings_found_by_a_search_stay_below_the_bound() {
     let table = worst_ticks::<F405>();
     if std::env::var_os("PAINLEVE_TICKS").is_none() {

@@ -4,7 +4,7 @@ use painleve_chips::MILLISECOND;
 use painleve_chips::machine::Reset;
 use painleve_chips::stm32::Crystal;
 use painleve_flash_image::bench::{Bench, encoded, scenario};
-use painleve_flash_image::board::{BoardChip, EmulatedBoard};
+use painleve_flash_image::board::{BoardChip, EmulatedBoard, F405, G474};
 use painleve_shared::black_box::{BlackBox, Crash, FaultRecord, ResetCause};
 use painleve_shared::frame::SensorFrame;
 use painleve_shared::message::{FrameSource, Request, Response};
@@ -24,7 +24,6 @@ crate::on_each_board! {
     a_crystal_that_stops_takes_the_torque_off,
     a_low_supply_takes_the_torque_off,
     a_board_with_a_low_supply_waits_for_a_higher_one,
-    a_new_chip_programs_its_brown_out_level,
     a_reset_takes_the_torque_off,
     the_black_box_outlives_a_reset_and_names_its_reason,
     a_fault_without_a_frame_is_recorded_with_the_next_frame,
@@ -161,7 +160,18 @@ fn a_board_with_a_low_supply_waits_for_a_higher_one<C: BoardChip>() {
 }
 
 /// Programming takes longer than the watchdog's limit during the start. The level counts when power has come up again.
-fn a_new_chip_programs_its_brown_out_level<C: BoardChip>() {
+#[test]
+fn a_new_chip_programs_its_brown_out_level() {
+    programs_its_brown_out_level::<G474>();
+}
+
+#[test]
+#[ignore = "programs for 800 ms of the chip's time"]
+fn a_new_chip_programs_its_brown_out_level_for_long() {
+    programs_its_brown_out_level::<F405>();
+}
+
+fn programs_its_brown_out_level<C: BoardChip>() {
     const LOW_MV: u32 = 2690;
     let mut board = EmulatedBoard::<C>::with_oscillator(C::OSCILLATOR_HZ[2]);
     board.machine.chip_mut().set_new_options();

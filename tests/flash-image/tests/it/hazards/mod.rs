@@ -5,8 +5,8 @@
 
 mod chip;
 mod host;
-mod second_sensors;
-mod sensors;
+pub mod second_sensors;
+pub mod sensors;
 mod watchdogs;
 
 use painleve_chips::MILLISECOND;

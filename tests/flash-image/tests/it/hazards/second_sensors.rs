@@ -43,61 +43,76 @@ fn bench<C: BoardChip>(scenario: &Scenario, mounted: Mounting) -> Bench<C> {
 
 /// The first or the second encoder of either joint repeats a plausible angle while the tip moves along the belt.
 fn a_frozen_encoder_is_contradicted_by_the_other<C: BoardChip>() {
-    let tolerance = i64::from(Mounting::default().second_encoder_tolerance);
     for joint in 0..2 {
-        for is_second in [false, true] {
-            let mut bench = driven::<C>();
-            let frozen = if is_second {
-                &mut bench.second_is_frozen
-            } else {
-                &mut bench.is_frozen
-            };
-            frozen[joint] = true;
-            let frozen_at = bench.frame.joints[joint].0;
-            let (harm, ticks) = Harm::until_off_counting(&mut bench, 2000, |bench| {
-                let apart = i64::from(bench.frame.joints[joint].0) - i64::from(frozen_at);
-                apart.abs() > tolerance
-            });
-            println!("joint {joint}, second {is_second}: {ticks} ticks, {harm:?}");
-            assert!(ticks <= LIMIT_TICKS, "{ticks}");
-            bench.assert_stays_off(100);
-            assert_eq!(latched_fault(&mut bench), Some(Fault::EncoderOutOfRange));
-        }
+        frozen::<C>(joint);
     }
+}
+
+/// Returns the worse of what the arm does until the torque is off.
+pub fn frozen<C: BoardChip>(joint: usize) -> Harm {
+    let tolerance = i64::from(Mounting::default().second_encoder_tolerance);
+    let harms = [false, true].map(|is_second| {
+        let mut bench = driven::<C>();
+        let frozen = if is_second {
+            &mut bench.second_is_frozen
+        } else {
+            &mut bench.is_frozen
+        };
+        frozen[joint] = true;
+        let frozen_at = bench.frame.joints[joint].0;
+        let (harm, ticks) = Harm::until_off_counting(&mut bench, 2000, |bench| {
+            let apart = i64::from(bench.frame.joints[joint].0) - i64::from(frozen_at);
+            apart.abs() > tolerance
+        });
+        println!("joint {joint}, second {is_second}: {ticks} ticks, {harm:?}");
+        assert!(ticks <= LIMIT_TICKS, "{ticks}");
+        bench.assert_stays_off(100);
+        assert_eq!(latched_fault(&mut bench), Some(Fault::EncoderOutOfRange));
+        harm
+    });
+    harms[0].or_worse(&harms[1])
 }
 
 /// The first or the second force cell repeats the reading without a force, or the present one.
 fn a_stuck_force_cell_is_contradicted_by_the_other<C: BoardChip>() {
+    for is_zero in [true, false] {
+        stuck::<C>(is_zero);
+    }
+}
+
+/// Returns the worse of what the arm does until the torque is off.
+pub fn stuck<C: BoardChip>(is_zero: bool) -> Harm {
     // The difference that the image has measured before has an error by noise, too.
     let tolerance = i32::from(Mounting::default().second_force_tolerance) + 4;
-    for is_zero in [true, false] {
-        for is_second in [false, true] {
-            let mut bench = driven::<C>();
-            let present = [bench.frame.tangential_force.0, bench.frame.normal_force.0];
-            let stuck_at = if is_zero { [0; 2] } else { present };
-            let stuck = if is_second {
-                &mut bench.second_force_is_stuck_at
-            } else {
-                &mut bench.force_is_stuck_at
-            };
-            *stuck = Some(stuck_at);
-            bench.present();
-            let mut ticks = 0;
-            // With noise the readings may contradict each other in one tick and not in the next.
-            while bench.board.torque().enabled == Some(true) {
-                let (harm, wrong) = Harm::until_off_counting(&mut bench, 2000, |bench| {
-                    let now = [bench.frame.tangential_force.0, bench.frame.normal_force.0];
-                    (0..2).any(|axis| (now[axis] - stuck_at[axis]).abs() > tolerance)
-                });
-                ticks += wrong;
-                println!("zero {is_zero}, second {is_second}: {ticks} ticks, {harm:?}");
-                bench.tick();
-            }
-            assert!(ticks <= LIMIT_TICKS, "{ticks}");
-            bench.assert_stays_off(100);
-            assert_eq!(latched_fault(&mut bench), Some(Fault::ForceOutOfRange));
+    let harms = [false, true].map(|is_second| {
+        let mut bench = driven::<C>();
+        let present = [bench.frame.tangential_force.0, bench.frame.normal_force.0];
+        let stuck_at = if is_zero { [0; 2] } else { present };
+        let stuck = if is_second {
+            &mut bench.second_force_is_stuck_at
+        } else {
+            &mut bench.force_is_stuck_at
+        };
+        *stuck = Some(stuck_at);
+        bench.present();
+        let (mut ticks, mut worst) = (0, Harm::default());
+        // With noise the readings may contradict each other in one tick and not in the next.
+        while bench.board.torque().enabled == Some(true) {
+            let (harm, wrong) = Harm::until_off_counting(&mut bench, 2000, |bench| {
+                let now = [bench.frame.tangential_force.0, bench.frame.normal_force.0];
+                (0..2).any(|axis| (now[axis] - stuck_at[axis]).abs() > tolerance)
+            });
+            ticks += wrong;
+            println!("zero {is_zero}, second {is_second}: {ticks} ticks, {harm:?}");
+            worst = worst.or_worse(&harm);
+            bench.tick();
         }
-    }
+        assert!(ticks <= LIMIT_TICKS, "{ticks}");
+        bench.assert_stays_off(100);
+        assert_eq!(latched_fault(&mut bench), Some(Fault::ForceOutOfRange));
+        worst
+    });
+    harms[0].or_worse(&harms[1])
 }
 
 fn a_second_sensor_that_dies_takes_the_torque_off<C: BoardChip>() {

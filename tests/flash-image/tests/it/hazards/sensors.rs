@@ -76,15 +76,21 @@ fn a_force_cell_that_dies_takes_the_torque_off<C: BoardChip>() {
 /// The tip moves on the belt; the only encoder of a joint repeats a plausible angle.
 fn an_encoder_that_freezes_takes_the_torque_off<C: BoardChip>() {
     for encoder in 0..2 {
-        let mut bench = Bench::<C>::new(&with_one_sensor(DEFAULT));
-        bench.drive();
-        bench.is_frozen[encoder] = true;
-        let harm = Harm::until_off(&mut bench, 2000);
-        let fault = latched_fault(&mut bench);
-        println!("encoder {encoder}: {fault:?} after {harm:?}");
-        assert!(fault.is_some());
-        bench.assert_stays_off(100);
+        frozen::<C>(encoder);
     }
+}
+
+/// Returns what the arm does until the torque is off.
+pub fn frozen<C: BoardChip>(encoder: usize) -> Harm {
+    let mut bench = Bench::<C>::new(&with_one_sensor(DEFAULT));
+    bench.drive();
+    bench.is_frozen[encoder] = true;
+    let harm = Harm::until_off(&mut bench, 2000);
+    let fault = latched_fault(&mut bench);
+    println!("encoder {encoder}: {fault:?} after {harm:?}");
+    assert!(fault.is_some());
+    bench.assert_stays_off(100);
+    harm
 }
 
 /// The only encoder of a joint repeats its last angle and says why; its diagnostics are read every 64 ticks.
