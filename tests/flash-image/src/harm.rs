@@ -6,7 +6,7 @@ use crate::bench::Bench;
 use crate::board::BoardChip;
 
 /// Motion and force of the arm from a failure until the torque is off.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Harm {
     /// Ticks until the torque is off.
     pub ticks: u32,
@@ -27,6 +27,18 @@ impl Harm {
     /// If it is still on after `limit` ticks.
     pub fn until_off<C: BoardChip>(bench: &mut Bench<C>, limit: u32) -> Self {
         Self::until_off_counting(bench, limit, |_| false).0
+    }
+
+    /// Returns the larger of each figure.
+    #[must_use]
+    pub fn or_worse(&self, other: &Self) -> Self {
+        Self {
+            ticks: self.ticks.max(other.ticks),
+            turned_deg: self.turned_deg.max(other.turned_deg),
+            tip_mm: self.tip_mm.max(other.tip_mm),
+            before_n: self.before_n.max(other.before_n),
+            normal_force_n: self.normal_force_n.max(other.normal_force_n),
+        }
     }
 
     /// Runs until the torque is off; returns also the number of ticks with the torque on after which `is_wrong`

@@ -20,8 +20,9 @@ use painleve_shared::status::{Fault, SupervisorState};
 /// Ticks within which the torque is off: the check's 0.2 s, after the tip has come to rest.
 const LIMIT_TICKS: u32 = 400;
 
-/// The reading at which the force cell is stuck: that without a force, or the present one.
-fn takes_the_torque_off<C: BoardChip>(is_zero: bool) {
+/// The reading at which the force cell is stuck: that without a force, or the present one. Returns what the arm does until
+/// the torque is off.
+pub fn takes_the_torque_off<C: BoardChip>(is_zero: bool) -> Harm {
     let mut bench = Bench::<C>::new(&with_one_sensor("hybrid-elbow-down"));
     bench.drive();
     let present = [bench.frame.tangential_force.0, bench.frame.normal_force.0];
@@ -39,6 +40,7 @@ fn takes_the_torque_off<C: BoardChip>(is_zero: bool) {
     println!("{fault:?} after {harm:?}");
     assert_eq!(fault, Some(Fault::GapAgainstForce));
     bench.assert_stays_off(100);
+    harm
 }
 
 #[test]

@@ -11,4 +11,5 @@ mod open_loop;
 mod random_faults;
 mod release;
 mod stored;
+mod stuck_sensors;
 mod tables;
