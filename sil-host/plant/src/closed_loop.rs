@@ -1,6 +1,7 @@
 //! The closed loop: sample, exchange, record, advance, tick by tick.
 
 use hdrhistogram::Histogram;
+use painleve_shared::LinkMotion;
 use painleve_shared::frame::{ActuatorFrame, SensorFrame, StatusFlags};
 use painleve_shared::status::Fault;
 use xxhash_rust::xxh3::Xxh3;
@@ -211,6 +212,10 @@ pub struct LoopResult {
     pub smoothness: Smoothness,
     /// Tip position at the end, m.
     pub final_tip_t_m: f64,
+    /// Link angles at the end, rad.
+    pub final_theta_rad: LinkMotion<f64>,
+    /// p at the end, 1/kg.
+    pub final_p_per_kg: f64,
     /// Reference at the end, m.
     pub final_reference_m: f64,
     /// Whether an edge holds the reference back at the end.
@@ -321,11 +326,14 @@ impl<H: ControllerHost, P: Plant> ClosedLoop<H, P> {
 
     /// Ends the run and returns its results.
     pub fn finish(self) -> (LoopResult, H) {
+        let last = self.simulation.plant().snapshot();
         let result = LoopResult {
             ticks: self.simulation.ticks(),
             statistics: self.statistics,
             smoothness: self.smoothness,
-            final_tip_t_m: self.simulation.plant().snapshot().tip_t_m,
+            final_tip_t_m: last.tip_t_m,
+            final_theta_rad: last.theta_rad,
+            final_p_per_kg: last.p_per_kg,
             final_reference_m: self.last_answer.reference_tip.to_metres(),
             at_edge: self.last_answer.flags.contains(StatusFlags::AT_EDGE),
             saturated_ticks: self.saturated_ticks,

@@ -9,6 +9,8 @@ use painleve_plant::scenario::Scenario;
 use painleve_process::terminal;
 use serde::{Deserialize, Serialize};
 
+use crate::paradox::ParadoxDistance;
+
 /// Percentiles of a duration, µs.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct DurationPercentiles {
@@ -78,10 +80,16 @@ pub struct RunReport {
     /// Distance of the tip from the governed reference at the end, m.
     #[serde(default)]
     pub error_m: f64,
+    /// Distance of the tip at the end from the place with p = 0, m; null unless an edge holds the reference back.
+    #[serde(default)]
+    pub to_edge_m: Option<f64>,
     /// Part of the governor's distance from the edges that is kept for what is not known of the arm, m; 0 unless an edge
     /// holds the reference back at the end.
     #[serde(default)]
     pub distance_for_knowledge_m: f64,
+    /// In words, what that distance is kept for above all; null without it.
+    #[serde(default)]
+    pub chief_doubt: Option<String>,
     /// Smallest normal force after the first 50 ms, N; null for shorter runs.
     pub min_normal_force_n: Option<f64>,
     /// Largest joint torque, N·m.
@@ -144,6 +152,11 @@ impl RunReport {
         let force = statistics.min_normal_force_n;
         let smoothness = &result.smoothness;
         let converters = &scenario.converters;
+        let distance_for_knowledge_m = if result.at_edge {
+            distance_for_knowledge_m(scenario)
+        } else {
+            0.0
+        };
         Self {
             scenario: scenario.name.clone(),
             controller: scenario.controller.law.name().into(),
@@ -167,11 +180,15 @@ impl RunReport {
                 .target_m()
                 .filter(|_| scenario.controller.law.name() != "off"),
             error_m: (result.final_tip_t_m - result.final_reference_m).abs(),
-            distance_for_knowledge_m: if result.at_edge {
-                distance_for_knowledge_m(scenario)
-            } else {
-                0.0
-            },
+            to_edge_m: to_edge_m(scenario, result),
+            distance_for_knowledge_m,
+            chief_doubt: (distance_for_knowledge_m > 0.0)
+                .then(|| {
+                    scenario
+                        .knowledge
+                        .chief_doubt(&scenario.controller_configuration().arm)
+                })
+                .flatten(),
             min_normal_force_n: force.is_finite().then_some(force),
             peak_torque_nm: statistics.peak_torque_nm,
             torque_change_moving_nm: smoothness.moving.torque_change_nm(converters),
@@ -245,11 +262,16 @@ impl RunReport {
             let why = if known_mm < 0.05 {
                 String::new()
             } else {
-                format!(
-                    "; held {short_mm:.1} mm short, {known_mm:.1} mm of it for what is not known of the arm (knowledge)"
-                )
+                let doubt = self.chief_doubt.as_deref().unwrap_or(UNKNOWN_PLACE);
+                format!("; held {short_mm:.1} mm short: {known_mm:.1} mm of it because {doubt}")
             };
             row("requested", format!("{:+.2} mm{why}", 1e3 * target_m));
+        }
+        if let Some(to_edge_m) = self.to_edge_m {
+            row(
+                "rests short of the edge",
+                format!("{:.2} mm", 1e3 * to_edge_m),
+            );
         }
         row("farthest tip", format!("{:+.2} mm", 1e3 * self.max_tip_t_m));
         let force = self
@@ -317,6 +339,18 @@ impl RunReport {
         }
         terminal::readable_table(table)
     }
+}
+
+/// Why a distance is kept if `[knowledge]` does not say it.
+const UNKNOWN_PLACE: &str = "the tip is known to controller.estimator.tip_deviation_m";
+
+/// Returns how far the tip rests from the edge that holds its reference back, m.
+fn to_edge_m(scenario: &Scenario, result: &LoopResult) -> Option<f64> {
+    let mut distance = ParadoxDistance::new(scenario).ok()?;
+    let edge_m = distance
+        .measure(&result.final_theta_rad, result.final_p_per_kg)
+        .edge_m;
+    (result.at_edge && edge_m.is_finite()).then_some(edge_m)
 }
 
 /// Returns by how much the governor's distance is larger because the arm is not known exactly, m.

@@ -418,3 +418,38 @@ fn a_run_that_is_being_written_is_not_overwritten() {
     assert_eq!(code(output.status), 130, "{output:?}");
     bench.report(&["run", "--set", "run.duration_s=0.1", "--json"]);
 }
+
+/// The place with p = 0 is where the scenario `edge` says: at 164.71 mm.
+#[test]
+fn a_run_held_by_an_edge_reports_how_near_it_rests_and_why_not_nearer() {
+    let bench = Bench::new("reach");
+    let number = |report: &Value, key: &str| report[key].as_f64().unwrap_or(f64::NAN);
+    let quiet = ["--no-record", "--no-plot", "--json"];
+    let known = bench.report(&[&["run", "edge"], &quiet[..]].concat());
+    let expected_m = 0.16471 - number(&known, "final_tip_t_m");
+    assert!(
+        (number(&known, "to_edge_m") - expected_m).abs() < 2e-5,
+        "{known}"
+    );
+    assert_eq!(known["chief_doubt"], Value::Null);
+    let doubtful = [
+        "controller.estimator.tip_deviation_m=0.002",
+        "knowledge.encoder_zero_rad=[0.005, 0.001]",
+    ];
+    let doubtful = doubtful.iter().flat_map(|change| ["--set", change]);
+    let doubtful: Vec<&str> = ["run", "edge"]
+        .into_iter()
+        .chain(doubtful)
+        .chain(quiet)
+        .collect();
+    let doubtful = bench.report(&doubtful);
+    let farther_m = number(&doubtful, "to_edge_m") - number(&known, "to_edge_m");
+    let kept_m = number(&doubtful, "distance_for_knowledge_m");
+    assert!((farther_m - kept_m).abs() < 1e-4, "{doubtful}");
+    assert_eq!(
+        doubtful["chief_doubt"],
+        "the encoders' zeros are known to 0.29°"
+    );
+    let free = bench.report(&[&["run", "hybrid-elbow-down"], &quiet[..]].concat());
+    assert_eq!(free["to_edge_m"], Value::Null);
+}

@@ -1,6 +1,6 @@
 //! How well the geometry of an arm is known.
 
-use painleve_shared::settings;
+use painleve_shared::{ArmParameters, settings};
 
 /// Beginning of the source of what a rehearsal has measured.
 const REHEARSAL: &str = "rehearsal";
@@ -45,8 +45,68 @@ impl Knowledge {
         format!("{REHEARSAL} with seed {seed}")
     }
 
+    /// Returns in words what leaves the tip's place on the belt most uncertain, each parameter taken alone; `None` if all
+    /// are known exactly.
+    pub fn chief_doubt(&self, arm: &ArmParameters<f32>) -> Option<String> {
+        let levers_m = [arm.height_m, arm.link_length_m[1]].map(f64::from);
+        let turns = [
+            ("the encoders' zeros are", self.encoder_zero_rad),
+            (
+                "the encoders' errors once around are",
+                self.encoder_once_rad,
+            ),
+            (
+                "the encoders' errors twice around are",
+                self.encoder_twice_rad,
+            ),
+        ];
+        let turns = turns.map(|(what, rad)| {
+            let effect_m = (rad[0] * levers_m[0]).max(rad[1] * levers_m[1]);
+            let degrees = rad[0].max(rad[1]).to_degrees();
+            (effect_m, format!("{what} known to {degrees:.2}°"))
+        });
+        let length_m = self.link_length_m[0].max(self.link_length_m[1]);
+        let distances = [
+            ("the links' lengths are", length_m),
+            ("the height over the belt is", self.height_m),
+            ("the tip is, as you told,", self.told_m),
+        ];
+        let distances = distances.map(|(what, effect_m)| {
+            let mm = 1e3 * effect_m;
+            (effect_m, format!("{what} known to {mm:.2} mm"))
+        });
+        let all = turns.into_iter().chain(distances);
+        let (effect_m, text) = all.max_by(|one, other| one.0.total_cmp(&other.0))?;
+        (effect_m > 0.0).then_some(text)
+    }
+
     /// Returns whether a rehearsal has written it: it describes no real arm.
     pub fn is_rehearsed(&self) -> bool {
         self.source.starts_with(REHEARSAL)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_parameter_that_moves_the_tip_most_is_named() {
+        let arm = ArmParameters::default();
+        assert_eq!(Knowledge::default().chief_doubt(&arm), None);
+        let mut knowledge = Knowledge {
+            encoder_zero_rad: [0.005, 0.001],
+            link_length_m: [0.001, 0.0015],
+            ..Knowledge::default()
+        };
+        let doubt = |knowledge: &Knowledge| knowledge.chief_doubt(&arm).unwrap_or_default();
+        assert_eq!(doubt(&knowledge), "the encoders' zeros are known to 0.29°");
+        knowledge.encoder_zero_rad = [0.001; 2];
+        assert_eq!(doubt(&knowledge), "the links' lengths are known to 1.50 mm");
+        knowledge.told_m = 0.002;
+        assert_eq!(
+            doubt(&knowledge),
+            "the tip is, as you told, known to 2.00 mm"
+        );
     }
 }
