@@ -58,9 +58,9 @@ impl<L: Law> TorqueDemand<L> {
             ..
         } = estimates;
         if target.recovering {
-            let edges_m = target.edges_for_landing.then_some(target.edges_m);
+            let stretch = target.edges_for_landing.then_some(target.stretch);
             let flight = &mut self.flight;
-            return self.recovery.tick(flight, arm, model, edges_m, self.tick_s);
+            return self.recovery.tick(flight, arm, model, stretch, self.tick_s);
         }
         self.flight.take_if(|flight| flight.touch(self.tick_s));
         let starts = phase.arms || contact.lands;

@@ -13,7 +13,7 @@ use crate::estimate::belt::BOUND_ERROR_M_S;
 use crate::estimate::model::Model;
 use crate::estimate::response::SETTLING_S;
 use crate::law::LawOutput;
-use crate::refer::governor::USABLE_REACH;
+use crate::refer::governor::{Stretch, USABLE_REACH};
 
 /// Height above the belt at which the tip moves along it, m.
 const CLEARANCE_M: f32 = 1e-3;
@@ -81,7 +81,7 @@ impl Flight {
 }
 
 impl RecoverySettings {
-    /// Computes the torques for one tick of `tick_s` (s) in the air, with the admissible stretch `edges_m`; until it
+    /// Computes the torques for one tick of `tick_s` (s) in the air, with the admissible `stretch`; until it
     /// is known the tip is held above the belt.
     // Out of line: its code in the controller's would take registers from every tick.
     #[inline(never)]
@@ -90,7 +90,7 @@ impl RecoverySettings {
         flight: &mut Option<Flight>,
         arm: &Arm<f32>,
         model: &Model,
-        edges_m: Option<(f32, f32)>,
+        stretch: Option<Stretch>,
         tick_s: f32,
     ) -> LawOutput {
         let flight = flight.get_or_insert(Flight {
@@ -109,16 +109,16 @@ impl RecoverySettings {
         if rests {
             flight.landing_m = model.tip_m.x;
         }
-        if let Some((lower, upper)) = edges_m {
-            flight.landing_m = flight.landing_m.limited(lower, upper);
+        if let Some(Stretch { lower_m, upper_m }) = stretch {
+            flight.landing_m = flight.landing_m.limited(lower_m, upper_m);
         }
         let away = flight.landing_m - model.tip_m.x;
         if rests {
             let onwards_m = ONWARDS_PER_S * tick_s * away;
             flight.beyond_m = (flight.beyond_m + onwards_m).within(FARTHEST_BEYOND_M);
         }
-        flight.lands = edges_m.is_some_and(|(lower, upper)| {
-            let admissible = model.tip_m.x > lower && model.tip_m.x < upper;
+        flight.lands = stretch.is_some_and(|Stretch { lower_m, upper_m }| {
+            let admissible = model.tip_m.x > lower_m && model.tip_m.x < upper_m;
             away.abs() < OVER_LANDING_PLACE_M || (flight.lands && admissible)
         });
         // Descend faster at greater height, and at landing speed close to the belt.
@@ -215,11 +215,14 @@ mod tests {
             path_rad: None,
             touched_s: 0.0,
         });
-        let edges = Some((-0.15, 0.15));
+        let stretch = Some(Stretch {
+            lower_m: -0.15,
+            upper_m: 0.15,
+        });
         let torque = (0..ticks)
             .map(|_| {
                 recovery
-                    .tick(&mut state, &arm, &model, edges, 1e-3)
+                    .tick(&mut state, &arm, &model, stretch, 1e-3)
                     .torque_nm
             })
             .last()
@@ -259,13 +262,16 @@ mod tests {
         let mut theta_dot = LinkMotion::zeros();
         let recovery = RecoverySettings::default();
         let mut state = None;
-        let edges = Some((tip_m.x, tip_m.x));
+        let stretch = Some(Stretch {
+            lower_m: tip_m.x,
+            upper_m: tip_m.x,
+        });
         let model_of = |theta, theta_dot, friction_nm: JointTorque<f32>| {
             Model::new(&arm, theta, theta_dot, &friction_nm.to_links())
         };
         let lands_at_m = (0..1000).find_map(|_| {
             let known = model_of(theta, theta_dot, JointTorque::zeros());
-            let torque = recovery.tick(&mut state, &arm, &known, edges, 1e-3);
+            let torque = recovery.tick(&mut state, &arm, &known, stretch, 1e-3);
             for _ in 0..STEPS {
                 let friction_nm = theta_dot
                     .to_joints()
@@ -298,10 +304,10 @@ mod tests {
             let mut theta_dot = LinkMotion::new(w1, w2);
             let recovery = RecoverySettings::default();
             let mut state = None;
-            let edges = (-0.18, 0.155);
+            let stretch = Stretch { lower_m: -0.18, upper_m: 0.155 };
             let landing = (0..1000).find_map(|_| {
                 let model = Model::new(&arm, theta, theta_dot, &GeneralisedTorque::zeros());
-                let torque = recovery.tick(&mut state, &arm, &model, Some(edges), 1e-3).torque_nm;
+                let torque = recovery.tick(&mut state, &arm, &model, Some(stretch), 1e-3).torque_nm;
                 for _ in 0..10 {
                     let model = Model::new(&arm, theta, theta_dot, &GeneralisedTorque::zeros());
                     theta_dot += model.free_acceleration_rad_s2(&torque) * 1e-4;

@@ -44,7 +44,7 @@ pub struct Telemetry {
     pub slip: Slip,
     /// Whether the tip is estimated to stick to the belt.
     pub sticks: bool,
-    /// Edges of the admissible stretch of the belt, m.
+    /// Lower and upper edge of the admissible stretch of the belt, m.
     pub edges_m: [f32; 2],
     /// Whether an edge holds the reference back.
     pub at_edge: bool,
@@ -84,7 +84,7 @@ impl Telemetry {
             friction_deviation: contact.friction.deviation(),
             slip: contact.friction.slip,
             sticks: contact.friction.sticks,
-            edges_m: target.edges_m.into(),
+            edges_m: [target.stretch.lower_m, target.stretch.upper_m],
             at_edge: target.at_edge,
             recovering: target.recovering && supervisor.drives(),
             saturated: command.saturated,

@@ -130,6 +130,18 @@ fn p_of<T: Real>(q: &Matrix2<T>, friction: T, slip: Slip) -> T {
     q.m22 - friction * slip.sign::<T>() * q.m21
 }
 
+/// The second row of Q with the tip on the belt, multiplied by a positive factor. The sign of
+/// p = Q22 − μ s Q12 does not need the factor.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ScaledRow<T> {
+    /// Q12 (1/kg) times the factor.
+    pub q12: T,
+    /// Q22 (1/kg) times the factor.
+    pub q22: T,
+    /// The factor.
+    pub factor: T,
+}
+
 impl<T: Real> Arm<T> {
     /// Q = J M⁻¹ Jᵀ, 1/kg.
     #[inline]
@@ -144,9 +156,7 @@ impl<T: Real> Arm<T> {
         p_of(&self.inverse_tip_inertia(pose), friction, slip)
     }
 
-    /// Returns Q12 and Q22 (1/kg) with the tip on the belt at `tip_t_m`, both multiplied by a positive
-    /// factor, and that factor. The sign of p = Q22 − μ s Q12 does not need it. `None` out of reach or for a
-    /// straight arm.
+    /// Returns Q12 and Q22 with the tip on the belt at `tip_t_m`. `None` out of reach or for a straight arm.
     ///
     /// On the belt the columns (x1, y1) and (x2, y2) of J follow from z_t without trigonometry.
     /// With d² = z_t² + H², and W four times the area of the triangle formed by the links,
@@ -157,7 +167,11 @@ impl<T: Real> Arm<T> {
     /// 2d² x2 = H h2 − z_t W,    2d² y2 = z_t h2 + H W,
     /// 4 l1 l2 cos δ = (d² − (l1 − l2)²) − ((l1 + l2)² − d²),    2 l1 l2 sin δ = W
     /// ```
-    pub fn inverse_inertia_row_on_belt(&self, tip_t_m: T, posture: Posture) -> Option<(T, T, T)> {
+    pub fn inverse_inertia_row_on_belt(
+        &self,
+        tip_t_m: T,
+        posture: Posture,
+    ) -> Option<ScaledRow<T>> {
         let (height, reach) = (self.height_m, self.reach_m());
         let difference = self.length_1_m - self.length_2_m;
         let square = tip_t_m * tip_t_m + height * height;
@@ -190,7 +204,11 @@ impl<T: Real> Arm<T> {
         );
         let determinant = self.inertia_1 * self.inertia_2 - coupling * coupling;
         let scale = T::literal(4.0) * square * square * determinant;
-        Some((x_1 * row_1 + x_2 * row_2, y_1 * row_1 + y_2 * row_2, scale))
+        Some(ScaledRow {
+            q12: x_1 * row_1 + x_2 * row_2,
+            q22: y_1 * row_1 + y_2 * row_2,
+            factor: scale,
+        })
     }
 
     /// Evaluates all contact terms at link angles `theta` (rad), rates `theta_dot` (rad/s) and
@@ -275,10 +293,10 @@ mod tests {
             let posture = if up { Posture::ElbowUp } else { Posture::ElbowDown };
             let theta = arm().link_angles_on_belt_rad(tip, posture).unwrap();
             let q = arm().inverse_tip_inertia(&Pose::new(&theta));
-            let (tangential, normal, factor) = arm().inverse_inertia_row_on_belt(tip, posture).unwrap();
-            prop_assert!((normal / factor - q.m22).abs() < 1e-9 * q.m22);
-            prop_assert!(normal > 0.0);
-            prop_assert!((tangential / normal - q.m12 / q.m22).abs() < 1e-9);
+            let row = arm().inverse_inertia_row_on_belt(tip, posture).unwrap();
+            prop_assert!((row.q22 / row.factor - q.m22).abs() < 1e-9 * q.m22);
+            prop_assert!(row.q22 > 0.0);
+            prop_assert!((row.q12 / row.q22 - q.m12 / q.m22).abs() < 1e-9);
         }
 
         #[test]

@@ -132,6 +132,13 @@ struct Moments {
     measured: f32,
 }
 
+/// An estimate of ρ.
+struct Uncertain {
+    response: f32,
+    /// Its standard deviation.
+    deviation: f32,
+}
+
 impl Moments {
     /// Adds a measured difference, N, and the ones expected at each delay.
     #[inline]
@@ -154,16 +161,19 @@ impl Moments {
         self.measured += weight * (sums.measured - self.measured);
     }
 
-    /// Returns ρ and its standard deviation, from averages of blocks whose squared weights have this sum.
+    /// Returns ρ from averages of blocks whose squared weights have this sum.
     #[inline(never)]
-    fn response(&self, spread: f32) -> (f32, f32) {
+    fn response(&self, spread: f32) -> Uncertain {
         let largest = |most: f32, product: &f32| product.at_least(most);
         let most = self.products.iter().fold(0.0, largest);
         // Not zero where nothing was expected: the response is then unknown.
         let square = self.expected.at_least(1e-12);
         let variance = spread * self.measured * square;
         let deviation = (variance / f32::from(BLOCK_TICKS)).square_root() / square;
-        (most / square, deviation)
+        Uncertain {
+            response: most / square,
+            deviation,
+        }
     }
 }
 
@@ -292,12 +302,18 @@ impl ResponseEstimator {
     fn bound(&mut self) {
         self.block_ticks = 0;
         let [first, second] = &self.averages;
-        let (response, deviation) = first.response(self.spread);
+        let Uncertain {
+            response,
+            deviation,
+        } = first.response(self.spread);
         self.width = 2.0 * DEVIATIONS * deviation;
         self.gain = (response - DEVIATIONS * deviation) / RIGID;
         let upper = response + DEVIATIONS * deviation;
         self.give = (1.0 - upper / (DAMPED * RIGID)).at_least(0.0);
-        let (response, deviation) = second.response(self.spread);
+        let Uncertain {
+            response,
+            deviation,
+        } = second.response(self.spread);
         let upper = response + DEVIATIONS * deviation;
         self.lags = (2.0 - 2.0 * upper / RIGID).limited(0.0, 1.0);
     }

@@ -9,7 +9,7 @@ pub mod reference;
 use painleve_shared::Posture;
 use painleve_shared::status::SupervisorState;
 
-use self::governor::EdgeGovernor;
+use self::governor::{EdgeGovernor, Stretch};
 use self::reference::{ReferenceGenerator, TipReference};
 use crate::estimate::Estimators;
 use crate::supervise::supervisor::Phase;
@@ -23,8 +23,8 @@ pub struct Target {
     pub requested_m: f32,
     /// Posture in which the tip should be there.
     pub posture: Posture,
-    /// Edges of the admissible stretch of the belt, m.
-    pub edges_m: (f32, f32),
+    /// The admissible stretch of the belt.
+    pub stretch: Stretch,
     /// Whether the edges have been found for the landing of a tip that must be returned to the belt.
     pub edges_for_landing: bool,
     /// Whether an edge holds the reference back.
@@ -127,7 +127,7 @@ impl References {
             },
             requested_m: wanted.position_m,
             posture: self.posture,
-            edges_m: self.governor.edges_m(),
+            stretch: self.governor.stretch(),
             edges_for_landing: recovering
                 && self
                     .governor

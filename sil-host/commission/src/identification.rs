@@ -316,9 +316,8 @@ pub fn slide_scenario(
         both_s = 2.0 * half_s,
     );
     // p = Q22 − μ s Q12 with the slip's direction s, against that of the belt.
-    let coupling = arm.inverse_inertia_row_on_belt(0.0, posture);
-    let speed_m_s =
-        BELT_M_S.copysign(coupling.map_or(1.0, |(tangential, ..)| f64::from(tangential)));
+    let row = arm.inverse_inertia_row_on_belt(0.0, posture);
+    let speed_m_s = BELT_M_S.copysign(row.map_or(1.0, |row| f64::from(row.q12)));
     // A hybrid law keeps its gains.
     let law = match scenario.controller.law.of_set() {
         Some(LawSettings::Hybrid(_)) => {

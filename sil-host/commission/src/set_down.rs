@@ -6,7 +6,7 @@
 use core::ops::Range;
 
 use painleve_firmware::estimate::friction::FrictionEstimate;
-use painleve_firmware::refer::governor::EdgeGovernor;
+use painleve_firmware::refer::governor::{EdgeGovernor, Stretch};
 use painleve_plant::scenario::Scenario;
 use painleve_shared::{Arm, OutOfRange, Pose, Posture, Slip};
 
@@ -77,10 +77,10 @@ impl SetDown {
         let found = (0..MOST_CALLS).find_map(|_| {
             governor.search(&arm, posture, best_m, &friction, 0.0);
             let is_found = governor.has_edges_for(posture, 0.0);
-            is_found.then(|| governor.edges_m())
+            is_found.then(|| governor.stretch())
         });
-        let clipped = |(lower_m, upper_m): (f32, f32)| {
-            f64::from(lower_m.max(-farthest_m))..f64::from(upper_m.min(farthest_m))
+        let clipped = |it: Stretch| {
+            f64::from(it.lower_m.max(-farthest_m))..f64::from(it.upper_m.min(farthest_m))
         };
         let best_m = f64::from(best_m);
         Ok(Self {

@@ -86,9 +86,7 @@ impl ParadoxDistance {
         let reach_m = USED_REACH * self.arm.reach_on_belt_m();
         let p = |tip_m: f64| {
             let row = self.arm.inverse_inertia_row_on_belt(tip_m, posture);
-            row.map_or(f64::NAN, |(coupling, normal, _)| {
-                normal - signed_friction * coupling
-            })
+            row.map_or(f64::NAN, |row| row.q22 - signed_friction * row.q12)
         };
         let at = |number: usize| reach_m * (2.0 * number as f64 / INTERVALS as f64 - 1.0);
         let crossing = |number: usize| {

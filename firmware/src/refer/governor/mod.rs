@@ -14,6 +14,7 @@ mod settings;
 
 use core::ops::ControlFlow;
 
+use painleve_shared::contact::ScaledRow;
 use painleve_shared::{Arm, Posture, Real};
 
 use self::search::Search;
@@ -32,13 +33,22 @@ const CAUGHT_M: f32 = 2e-5;
 /// Rate at which the remaining distance to a target decays, 1/s.
 const APPROACH_PER_S: f32 = 20.0;
 
+/// A stretch of the belt between two places, m.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Stretch {
+    /// The lower end, m.
+    pub lower_m: f32,
+    /// The upper end, m.
+    pub upper_m: f32,
+}
+
 /// The governor of one arm: the edges that it has found, and the reference that it follows.
 // In this order: see the fields of the controller.
 #[derive(Clone, Copy, Debug)]
 #[repr(C)]
 pub struct EdgeGovernor {
-    /// Edges of the admissible stretch around the tip, m.
-    edges_m: (f32, f32),
+    /// The admissible stretch around the tip.
+    stretch: Stretch,
     search: Search,
     /// Posture for which it looks, and the least ratio p/Q22 that it requires beyond the setting; `None` before the first.
     searched_for: Option<(Posture, f32)>,
@@ -61,7 +71,10 @@ impl EdgeGovernor {
     /// for the arm's reach (m).
     pub fn new(settings: &GovernorSettings, tick_s: f32, distance_m: f32, reach_m: f32) -> Self {
         Self {
-            edges_m: (-USABLE_REACH * reach_m, USABLE_REACH * reach_m),
+            stretch: Stretch {
+                lower_m: -USABLE_REACH * reach_m,
+                upper_m: USABLE_REACH * reach_m,
+            },
             search: Search::start(1.0, 0.0),
             searched_for: None,
             found_for: None,
@@ -82,9 +95,9 @@ impl EdgeGovernor {
         self.follows = false;
     }
 
-    /// Returns the edges of the admissible stretch, m.
-    pub fn edges_m(&self) -> (f32, f32) {
-        self.edges_m
+    /// Returns the admissible stretch, as far as it has been found.
+    pub fn stretch(&self) -> Stretch {
+        self.stretch
     }
 
     /// Returns whether both edges have been found for this posture and least p/Q22.
@@ -118,7 +131,10 @@ impl EdgeGovernor {
                 .searched_for
                 .is_none_or(|(before, _)| before != posture)
             {
-                self.edges_m = (-reach, reach);
+                self.stretch = Stretch {
+                    lower_m: -reach,
+                    upper_m: reach,
+                };
             }
             self.searched_for = Some((posture, landing_p_ratio));
             self.search = Search::start(1.0, tip_t_m);
@@ -132,15 +148,15 @@ impl EdgeGovernor {
         let there_m = point_m + direction * self.distance_m;
         let row = arm.inverse_inertia_row_on_belt(there_m, posture);
         // How much p exceeds its least value, 1/kg. Where it does, sliding has a solution with the margin.
-        let excess_per_kg = row.map_or(f32::MIN, |(tangential, normal, factor)| {
+        let excess_per_kg = row.map_or(f32::MIN, |ScaledRow { q12, q22, factor }| {
             let against = if friction.slip_seen {
-                friction.slip.sign::<f32>() * tangential
+                friction.slip.sign::<f32>() * q12
             } else {
                 // Both directions must be admissible.
-                tangential.abs()
+                q12.abs()
             };
-            let least = (least_p_ratio * normal).at_least(self.settings.p_per_kg * factor);
-            (normal - worst_friction * against - least) / factor
+            let least = (least_p_ratio * q22).at_least(self.settings.p_per_kg * factor);
+            (q22 - worst_friction * against - least) / factor
         });
         let edge_m = match search.next(point_m, excess_per_kg, reach) {
             ControlFlow::Continue(search) => {
@@ -151,10 +167,13 @@ impl EdgeGovernor {
         };
         if direction > 0.0 {
             // Until the lower one is found, the edges stay in order.
-            self.edges_m = (self.edges_m.0.at_most(edge_m), edge_m);
+            self.stretch = Stretch {
+                lower_m: self.stretch.lower_m.at_most(edge_m),
+                upper_m: edge_m,
+            };
         } else {
             // A stretch shorter than both margins shrinks to a point.
-            self.edges_m.0 = edge_m.at_most(self.edges_m.1);
+            self.stretch.lower_m = edge_m.at_most(self.stretch.upper_m);
             self.found_for = self.searched_for;
         }
         self.search = Search::start(-direction, tip_t_m);
@@ -167,7 +186,10 @@ impl EdgeGovernor {
             self.position_m = wanted.position_m;
             return *wanted;
         }
-        let (lower, upper) = self.edges_m;
+        let Stretch {
+            lower_m: lower,
+            upper_m: upper,
+        } = self.stretch;
         let outside = |position: f32| position > upper || position < lower;
         let speed = wanted.velocity_m_s;
         let stop_m = wanted.position_m + 0.5 * speed * speed.abs() / braking_m_s2;

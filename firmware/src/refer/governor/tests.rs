@@ -62,9 +62,12 @@ fn searched(tip_t_m: f32, posture: Posture, friction: &FrictionEstimate) -> Edge
 fn the_edges_are_those_of_table_ii() {
     let friction = known(0.6, Slip::Positive);
     for (posture, edge) in [(Posture::ElbowUp, 0.182_68), (Posture::ElbowDown, 0.164_71)] {
-        let (lower, upper) = searched(-0.1, posture, &friction).edges_m();
-        assert!((upper - edge).abs() < 2e-5, "{posture:?}: {upper}");
-        assert!(lower < -0.183, "{posture:?}: {lower}");
+        let found = searched(-0.1, posture, &friction).stretch();
+        assert!(
+            (found.upper_m - edge).abs() < 2e-5,
+            "{posture:?}: {found:?}"
+        );
+        assert!(found.lower_m < -0.183, "{posture:?}: {found:?}");
     }
 }
 
@@ -83,11 +86,11 @@ fn a_reach_that_shrinks_during_a_search_does_not_hold_it_up() {
             let arm = if tick < shortened_at { arm() } else { shorter };
             governor.search(&arm, Posture::ElbowDown, -0.02, &friction, 0.0);
         }
-        let (lower, upper) = governor.edges_m();
+        let found = governor.stretch();
         let reach_m = shorter.reach_on_belt_m();
         assert!(
-            -reach_m < lower && upper < reach_m,
-            "{shortened_at}: {lower} {upper}"
+            -reach_m < found.lower_m && found.upper_m < reach_m,
+            "{shortened_at}: {found:?}"
         );
     }
 }
@@ -100,7 +103,7 @@ fn distance_m(configuration: &Configuration, landing: f32) -> f32 {
         let posture = Posture::ElbowDown;
         governor.search(&arm(), posture, -0.1, &friction, landing);
     }
-    0.164_71 - governor.edges_m().1
+    0.164_71 - governor.stretch().upper_m
 }
 
 #[test]
@@ -166,8 +169,10 @@ fn the_distance_grows_with_the_square_of_the_period() {
 #[test]
 fn a_tip_beyond_the_edge_is_led_back_to_the_stretch_next_to_it() {
     let friction = known(0.6, Slip::Positive);
-    let (_, upper) = searched(0.18, Posture::ElbowDown, &friction).edges_m();
-    assert!((upper - 0.164_71).abs() < 2e-5, "{upper}");
+    let upper_m = searched(0.18, Posture::ElbowDown, &friction)
+        .stretch()
+        .upper_m;
+    assert!((upper_m - 0.164_71).abs() < 2e-5, "{upper_m}");
 }
 
 /// p of 6/kg is kept beyond 0.165 m only, where the arm is nearly straight; on the way there it falls to 1.3/kg.
@@ -183,7 +188,7 @@ fn without_an_admissible_place_nearby_the_tip_is_led_to_the_best_one_and_not_acr
     for _ in 0..3000 {
         governor.search(&arm(), Posture::ElbowDown, tip_t_m, &friction, 0.0);
         if governor.has_edges_for(Posture::ElbowDown, 0.0) {
-            let (lower_m, upper_m) = governor.edges_m();
+            let Stretch { lower_m, upper_m } = governor.stretch();
             tip_t_m += (tip_t_m.max(lower_m).min(upper_m) - tip_t_m).clamp(-1e-3, 1e-3);
         }
     }
@@ -205,7 +210,7 @@ fn the_best_place_is_the_same_for_every_tip_or_the_tips_own() {
             for _ in 0..30 {
                 governor.search(&arm(), Posture::ElbowDown, tip_t_m, &friction, 0.0);
             }
-            let (lower_m, upper_m) = governor.edges_m();
+            let Stretch { lower_m, upper_m } = governor.stretch();
             assert_eq!(lower_m, upper_m, "{tip_t_m}");
             (upper_m != tip_t_m).then_some(upper_m)
         });
@@ -250,9 +255,10 @@ fn ramp(from: f32, speed: f32, end: f32) -> impl Fn(f32) -> TipReference {
 proptest! {
     #[test]
     fn edges_mirror_with_posture_and_slip(friction in 0.4_f32..1.0, tip in -0.1_f32..0.0) {
-        let here = searched(tip, Posture::ElbowDown, &known(friction, Slip::Positive)).edges_m();
-        let there = searched(-tip, Posture::ElbowUp, &known(friction, Slip::Negative)).edges_m();
-        prop_assert!((here.1 + there.0).abs() < 3e-5 && (here.0 + there.1).abs() < 3e-5);
+        let here = searched(tip, Posture::ElbowDown, &known(friction, Slip::Positive)).stretch();
+        let there = searched(-tip, Posture::ElbowUp, &known(friction, Slip::Negative)).stretch();
+        prop_assert!((here.upper_m + there.lower_m).abs() < 3e-5);
+        prop_assert!((here.lower_m + there.upper_m).abs() < 3e-5);
     }
 
     #[test]
@@ -261,7 +267,7 @@ proptest! {
     ) {
         let mut governor = searched(0.0, Posture::ElbowDown, &known(0.6, Slip::Positive));
         governor.restart(0.0);
-        let edge = governor.edges_m().1;
+        let edge = governor.stretch().upper_m;
         let (last, largest) = follow(&mut governor, ramp(0.0, speed, end));
         prop_assert!(governor.is_at_edge());
         prop_assert!(largest < edge + 1e-4, "{} {}", largest, edge);
@@ -317,7 +323,7 @@ fn edges_of_the_other_posture_are_forgotten() {
     assert!(!governor.has_edges_for(Posture::ElbowDown, 0.2));
     governor.search(&arm(), Posture::ElbowUp, 0.0, &friction, 0.0);
     assert!(!governor.has_edges_for(Posture::ElbowUp, 0.0));
-    let (_, upper_m) = governor.edges_m();
+    let upper_m = governor.stretch().upper_m;
     assert!(upper_m > 0.183, "{upper_m}");
 }
 
@@ -354,11 +360,14 @@ fn edges_stay_in_order_where_the_tip_has_crossed_one() {
     let friction = known(0.8, Slip::Positive);
     let governor = searched(-0.1, Posture::ElbowDown, &friction);
     let mut crossed = governor;
-    crossed.edges_m = (0.25, 0.3);
+    crossed.stretch = Stretch {
+        lower_m: 0.25,
+        upper_m: 0.3,
+    };
     for _ in 0..300 {
         crossed.search(&arm(), Posture::ElbowDown, -0.1, &friction, 0.0);
-        let (lower_m, upper_m) = crossed.edges_m();
+        let Stretch { lower_m, upper_m } = crossed.stretch();
         assert!(lower_m <= upper_m, "{lower_m} {upper_m}");
     }
-    assert_eq!(crossed.edges_m(), governor.edges_m());
+    assert_eq!(crossed.stretch(), governor.stretch());
 }
