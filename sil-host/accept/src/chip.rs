@@ -102,8 +102,10 @@ pub struct Chip {
     pub name: &'static str,
     /// Its device number.
     pub device: u32,
-    /// Address of the size of its flash, KiB, and the position of the size in the word.
-    pub flash_size: (u32, u32),
+    /// Address of the word with the size of its flash, KiB.
+    pub flash_size_address: u32,
+    /// Position of the size in the word, bits.
+    pub flash_size_shift: u32,
     /// Expected size of its flash, KiB.
     pub flash_kib: u32,
     /// Address of its unique number, three words.
@@ -134,8 +136,10 @@ pub struct Chip {
     pub options: &'static [OptionField],
     /// The analog-to-digital converter.
     pub converter: Converter,
-    /// Start and length of the memory with the log's buffer.
-    pub variables: (u32, u32),
+    /// Start of the memory with the log's buffer.
+    pub variables_address: u32,
+    /// Length of this memory.
+    pub variables_bytes: u32,
 }
 
 /// Stores that prepare an analog-to-digital converter, and its registers.
@@ -143,10 +147,14 @@ pub struct Chip {
 pub struct Converter {
     /// Addresses and words, in their order; each takes effect before the next arrives.
     pub preparation: &'static [(u32, u32)],
-    /// Selects PA4 and PA5.
-    pub selection: (u32, [u32; 2]),
-    /// Starts a conversion.
-    pub start: (u32, u32),
+    /// Register that selects a channel.
+    pub selection_address: u32,
+    /// Words for it that select PA4 and PA5.
+    pub selections: [u32; 2],
+    /// Register that starts a conversion.
+    pub start_address: u32,
+    /// Word for it that does.
+    pub start: u32,
     /// The result.
     pub result: u32,
 }
@@ -156,7 +164,8 @@ pub static CHIPS: [Chip; 2] = [
     Chip {
         name: "STM32F405",
         device: 0x413,
-        flash_size: (0x1fff_7a20, 16),
+        flash_size_address: 0x1fff_7a20,
+        flash_size_shift: 16,
         flash_kib: 1024,
         unique: 0x1fff_7a10,
         core_hz: 168e6,
@@ -202,16 +211,20 @@ pub static CHIPS: [Chip; 2] = [
                 (0x4001_2010, 0x0003_f000),
                 (0x4001_2008, 1),
             ],
-            selection: (0x4001_2034, [4, 5]),
-            start: (0x4001_2008, 1 << 30 | 1),
+            selection_address: 0x4001_2034,
+            selections: [4, 5],
+            start_address: 0x4001_2008,
+            start: 1 << 30 | 1,
             result: 0x4001_204c,
         },
-        variables: (0x2001_da80, 9600),
+        variables_address: 0x2001_da80,
+        variables_bytes: 9600,
     },
     Chip {
         name: "STM32G474",
         device: 0x469,
-        flash_size: (0x1fff_75e0, 0),
+        flash_size_address: 0x1fff_75e0,
+        flash_size_shift: 0,
         flash_kib: 512,
         unique: 0x1fff_7590,
         core_hz: 170e6,
@@ -265,11 +278,14 @@ pub static CHIPS: [Chip; 2] = [
                 (0x5000_0108, 1 << 28 | 1),
                 (0x5000_0118, 7 << 9 | 7 << 21),
             ],
-            selection: (0x5000_0130, [17 << 6, 13 << 6]),
-            start: (0x5000_0108, 1 << 28 | 1 << 2 | 1),
+            selection_address: 0x5000_0130,
+            selections: [17 << 6, 13 << 6],
+            start_address: 0x5000_0108,
+            start: 1 << 28 | 1 << 2 | 1,
             result: 0x5000_0140,
         },
-        variables: (0x2000_4000, 16 << 10),
+        variables_address: 0x2000_4000,
+        variables_bytes: 16 << 10,
     },
 ];
 

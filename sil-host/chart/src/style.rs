@@ -75,9 +75,17 @@ pub fn over_white(colour: Colour, opacity: f64) -> Colour {
     Colour(mix(colour.0), mix(colour.1), mix(colour.2))
 }
 
-/// Returns about `count` round values within a range, and their spacing: 1, 2 or 5 times a power of
-/// ten.
-pub fn ticks(range: &Range<f64>, count: usize) -> (Vec<f64>, f64) {
+/// Round values along an axis.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Ticks {
+    /// The values.
+    pub values: Vec<f64>,
+    /// Their spacing: 1, 2 or 5 times a power of ten.
+    pub step: f64,
+}
+
+/// Returns about `count` round values within a range.
+pub fn ticks(range: &Range<f64>, count: usize) -> Ticks {
     let span = range.end - range.start;
     let coarsest = span / count.max(1) as f64;
     let power = 10_f64.powf(coarsest.log10().floor());
@@ -86,7 +94,10 @@ pub fn ticks(range: &Range<f64>, count: usize) -> (Vec<f64>, f64) {
         .map(|factor| factor * power)
         .find(|step| *step >= coarsest * (1.0 - 1e-9));
     let Some(step) = step.filter(|step| step.is_normal()) else {
-        return (Vec::new(), span);
+        return Ticks {
+            values: Vec::new(),
+            step: span,
+        };
     };
     // Rounding must not drop a tick at the very end.
     let slack = 1e-6 * span;
@@ -96,10 +107,16 @@ pub fn ticks(range: &Range<f64>, count: usize) -> (Vec<f64>, f64) {
     );
     // At such a distance from zero, adjacent ticks are the same number.
     if last.abs().max(first.abs()) > 1e15 {
-        return (Vec::new(), step);
+        return Ticks {
+            values: Vec::new(),
+            step,
+        };
     }
-    let ticks = (first as i64..=last as i64).map(|tick| tick as f64 * step);
-    (ticks.collect(), step)
+    let values = (first as i64..=last as i64).map(|tick| tick as f64 * step);
+    Ticks {
+        values: values.collect(),
+        step,
+    }
 }
 
 /// Removes points on a straight vertical or horizontal run to the next point.
@@ -186,13 +203,16 @@ mod tests {
 
     #[test]
     fn ticks_are_round_and_within_the_range() {
+        let six = ticks(&(0.0..6.0), 6);
+        assert_eq!(six.values, [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0]);
+        assert_eq!(six.step, 1.0);
+        let three = ticks(&(-0.31..0.25), 4);
         assert_eq!(
-            ticks(&(0.0..6.0), 6),
-            (vec![0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0], 1.0)
+            (&three.values[..], three.step),
+            (&[-0.2, 0.0, 0.2][..], 0.2)
         );
-        assert_eq!(ticks(&(-0.31..0.25), 4), (vec![-0.2, 0.0, 0.2], 0.2));
-        assert_eq!(ticks(&(1e20..1e20 + 1e5), 4).0, []);
-        assert_eq!(ticks(&(5.0..5.0), 4).0, []);
+        assert_eq!(ticks(&(1e20..1e20 + 1e5), 4).values, []);
+        assert_eq!(ticks(&(5.0..5.0), 4).values, []);
     }
 
     #[test]

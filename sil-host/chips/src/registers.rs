@@ -3,7 +3,7 @@
 
 use std::collections::BTreeMap;
 
-use crate::bit_band::bit_band;
+use crate::bit_band::{AliasedBit, bit_band};
 
 /// The registers of the peripherals in use: bits, and the value after a reset, by address.
 #[derive(Clone, Debug)]
@@ -59,7 +59,7 @@ impl Registers {
     /// If the chip has no such register, or no such bits in it.
     pub fn check(&self, address: u32, size: u32, stored: Option<u32>) {
         let (word, width, shift) = match bit_band(address) {
-            Some((word, bit)) => (word, 1, bit),
+            Some(AliasedBit { word, bit }) => (word, 1, bit),
             None => (address & !3, 8 * size, 8 * (address & 3)),
         };
         let Some((bits, _)) = self.0.get(&word) else {

@@ -140,11 +140,10 @@ fn simulate(
             request_realtime().tell("plant", arguments.quiet);
             let paced = Paced::start(end, scenario.run.tick_hz)?;
             let (result, host, wall) = drive(scenario, simulation, paced, output)?;
-            let (lateness_ns, missed, end) = host.finish();
-            end.end()?;
+            host.end.end()?;
             RunReport {
-                wake_up_us: Some(DurationPercentiles::of_ns(&lateness_ns)),
-                missed_deadlines: Some(missed),
+                wake_up_us: Some(DurationPercentiles::of_ns(&host.lateness_ns)),
+                missed_deadlines: Some(host.missed_deadlines),
                 ..RunReport::new(scenario, name, pacing.name(), &result, wall)
             }
         }

@@ -161,13 +161,13 @@ fn by_the_clock(scenario: &Scenario, interrupt: &Interrupt) -> Result<TimingRepo
     let range = |source| ScenarioError::range(&scenario.name, source);
     let controller = InProcess::new(&configuration).map_err(range)?;
     let metronome = Metronome::start(controller, &configuration)?;
-    let (lateness_ns, missed_deadlines) = drive(scenario, metronome, interrupt)?.finish();
+    let metronome = drive(scenario, metronome, interrupt)?;
     let (name, unit) = (&scenario.name, Unit::Nanoseconds);
     let tick_hz = scenario.run.tick_hz;
     let host = &Host::Native.name();
     Ok(TimingReport {
-        missed_deadlines,
-        ..TimingReport::new(name, tick_hz, host, "wake-up", unit, &lateness_ns)
+        missed_deadlines: metronome.missed_deadlines,
+        ..TimingReport::new(name, tick_hz, host, "wake-up", unit, &metronome.lateness_ns)
     })
 }
 

@@ -7,7 +7,7 @@
 use nalgebra::SMatrix;
 use painleve_shared::Posture;
 
-use crate::geometry::{Place, Range, reach_m};
+use crate::geometry::{Place, Range, reach_by, reach_m};
 use crate::parameters::{COUNT, Parameter, Parameters, Prior, Values};
 use crate::passes::Points;
 
@@ -156,7 +156,7 @@ impl Fit {
     /// Returns the standard deviation of the tip's distance from either edge, m: the largest in both postures, since the governor
     /// has one for both. The edges move with the reach. A wrong scale moves both, and does not matter.
     pub fn tip_deviation_m(&self) -> f64 {
-        let (reach, reach_by) = reach_m(&self.parameters);
+        let (reach, reach_by) = (reach_m(&self.parameters), reach_by(&self.parameters));
         let postures = [Posture::ElbowDown, Posture::ElbowUp].into_iter();
         self.largest(postures, &self.covariance, EDGE, |place| {
             reach_by * (place.tip_t_m / reach) - place.tip_by
@@ -183,7 +183,7 @@ impl Fit {
         farthest: f64,
         by: impl Fn(&Place) -> Values,
     ) -> f64 {
-        let (reach, _) = reach_m(&self.parameters);
+        let reach = reach_m(&self.parameters);
         let mut largest = 0.0_f64;
         for posture in postures {
             for index in 0..PLACES {

@@ -172,16 +172,23 @@ impl Place {
     }
 }
 
-/// Returns the largest |z_t| on the belt, m, and its derivatives.
-pub fn reach_m(parameters: &Parameters) -> (f64, Values) {
+/// Returns the largest |z_t| on the belt, m.
+pub fn reach_m(parameters: &Parameters) -> f64 {
     let [length_1, length_2] = parameters.link_length_m();
     let (sum, height) = (length_1 + length_2, parameters.get(Parameter::Height));
-    let reach = libm::sqrt((sum - height) * (sum + height));
+    libm::sqrt((sum - height) * (sum + height))
+}
+
+/// Returns the derivatives of [`reach_m`].
+pub fn reach_by(parameters: &Parameters) -> Values {
+    let [length_1, length_2] = parameters.link_length_m();
+    let (sum, height) = (length_1 + length_2, parameters.get(Parameter::Height));
+    let reach = reach_m(parameters);
     let mut by = Values::zeros();
     by[Parameter::Length.index()] = sum / reach * (sum / length_1);
     by[Parameter::Ratio.index()] = sum / reach * length_1;
     by[Parameter::Height.index()] = -height / reach;
-    (reach, by)
+    by
 }
 
 #[cfg(test)]
@@ -215,13 +222,13 @@ mod tests {
                 let at = |sign: f64| {
                     let mut moved = parameters;
                     moved.0[index] += sign * step;
-                    (Place::at(&moved, [first, elbow]), reach_m(&moved).0)
+                    (Place::at(&moved, [first, elbow]), reach_m(&moved))
                 };
                 let ((plus, far), (minus, near)) = (at(1.0), at(-1.0));
                 let close = |found: f64, two: f64| (found - two / (2.0 * step)).abs() < 1e-5;
                 prop_assert!(close(place.depth_by[index], plus.depth_m - minus.depth_m), "{index}");
                 prop_assert!(close(place.tip_by[index], plus.tip_t_m - minus.tip_t_m), "{index}");
-                prop_assert!(close(reach_m(&parameters).1[index], far - near), "{index}");
+                prop_assert!(close(reach_by(&parameters)[index], far - near), "{index}");
             }
             for joint in [0, 1] {
                 let at = |step: f64| joint_rad(&parameters, joint, elbow + step);
@@ -236,7 +243,7 @@ mod tests {
             parameters in arm(), share in -0.9_f64..0.9, up: bool,
         ) {
             let posture = if up { Posture::ElbowUp } else { Posture::ElbowDown };
-            let tip = share * reach_m(&parameters).0;
+            let tip = share * reach_m(&parameters);
             let place = Place::on_belt(&parameters, posture, tip).unwrap();
             prop_assert!(place.depth_m.abs() < 1e-9, "{}", place.depth_m);
             prop_assert!((place.tip_t_m - tip).abs() < 1e-8, "{}", place.tip_t_m);

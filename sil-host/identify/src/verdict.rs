@@ -171,7 +171,7 @@ pub(crate) fn check_observed(
     if now_m <= limits.tip_deviation_m {
         return Ok(());
     }
-    let (reach, _) = reach_m(&fit.parameters);
+    let reach = reach_m(&fit.parameters);
     let mut candidates = Vec::new();
     for posture in [Posture::ElbowDown, Posture::ElbowUp] {
         let is_new = postures().all(|it| it != posture);

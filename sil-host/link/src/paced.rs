@@ -14,12 +14,15 @@ use crate::PlantEnd;
 
 /// The plant's end of the link with absolute deadlines.
 pub struct Paced {
-    end: PlantEnd,
+    /// The link.
+    pub end: PlantEnd,
     pacer: Pacer,
     /// Part of a tick within which an answer is in time.
     patience: Duration,
-    lateness_ns: Histogram<u64>,
-    missed_deadlines: u64,
+    /// Lateness of the wake-ups, ns.
+    pub lateness_ns: Histogram<u64>,
+    /// Number of wake-ups that were late by a tick or more.
+    pub missed_deadlines: u64,
     period: Duration,
 }
 
@@ -38,12 +41,6 @@ impl Paced {
             missed_deadlines: 0,
             period,
         })
-    }
-
-    /// Returns the lateness of the wake-ups in ns, the number that were late by a tick or more, and
-    /// the link.
-    pub fn finish(self) -> (Histogram<u64>, u64, PlantEnd) {
-        (self.lateness_ns, self.missed_deadlines, self.end)
     }
 
     /// Spends a tick: sends its frame, unless it is lost, and waits for the answer and for the clock.

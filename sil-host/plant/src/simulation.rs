@@ -144,7 +144,7 @@ impl<P: Plant> Simulation<P> {
         self.lost = self.link.draw();
         let time_s = self.plant.time_s();
         let force_n = self.plant.contact_force_n();
-        let (tangential_force, normal_force) = self.force_cell.read(&force_n, time_s);
+        let force = self.force_cell.read(&force_n, time_s);
         let enabled = time_s >= self.enable_at_s;
         // The counters on the wire wrap.
         let tick = self.first_tick.wrapping_add(self.clock.tick() as u32);
@@ -152,8 +152,8 @@ impl<P: Plant> Simulation<P> {
             tick,
             sequence: tick,
             joints: self.encoders.readings(time_s),
-            normal_force,
-            tangential_force,
+            normal_force: force.normal,
+            tangential_force: force.tangential,
             inputs: if enabled {
                 DigitalInputs::ENABLE
             } else {

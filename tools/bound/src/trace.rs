@@ -98,9 +98,18 @@ impl<'a> Tracer<'a> {
     }
 }
 
-/// Returns executed instructions with the last round alone of each wait for hardware, and the cycles to which the bound limits
-/// these waits. The emulated clock is not that of the model: a wait has other rounds, but the same time.
-pub fn without_waits(loops: &[Loop], addresses: &[u32]) -> (Vec<u32>, u32) {
+/// Executed instructions with the last round alone of each wait for hardware.
+#[derive(Clone, Debug)]
+pub struct WithoutWaits {
+    /// Addresses of the instructions.
+    pub addresses: Vec<u32>,
+    /// Cycles to which the bound limits the waits.
+    pub waited_cycles: u32,
+}
+
+/// Leaves out all but the last round of each wait for hardware. The emulated clock is not that of the model: a wait has other
+/// rounds, but the same time.
+pub fn without_waits(loops: &[Loop], addresses: &[u32]) -> WithoutWaits {
     let (mut kept, mut waited, mut start) = (Vec::new(), 0, 0);
     for address in addresses {
         let mut begun = loops.iter().filter(|one| one.header == *address);
@@ -118,7 +127,10 @@ pub fn without_waits(loops: &[Loop], addresses: &[u32]) -> (Vec<u32>, u32) {
         }
         kept.push(*address);
     }
-    (kept, waited)
+    WithoutWaits {
+        addresses: kept,
+        waited_cycles: waited,
+    }
 }
 
 /// Returns the largest number of iterations of a loop among all its entries in the executed

@@ -72,10 +72,9 @@ fn read<P: Port>(
     channel: usize,
     codes: Option<(u32, u32)>,
 ) -> Result<u32, StepError> {
-    let (selection, channels) = converter.selection;
-    bench.store(selection, channels[channel])?;
-    let (start, value) = converter.start;
-    let stores = codes.into_iter().chain([(start, value)]);
+    bench.store(converter.selection_address, converter.selections[channel])?;
+    let start = (converter.start_address, converter.start);
+    let stores = codes.into_iter().chain([start]);
     let mut probes: Vec<Probe> = stores
         .map(|(address, value)| Probe::Store { address, value })
         .collect();

@@ -44,8 +44,8 @@ pub fn measure<P: Port>(bench: &mut Bench<P>) -> Result<Vec<Check>, StepError> {
     let Some(chip) = bench.chip else {
         return Ok(checks);
     };
-    let (address, shift) = chip.flash_size;
-    let kib = bench.load(address)?.value >> shift & 0xffff;
+    let word = bench.load(chip.flash_size_address)?.value;
+    let kib = word >> chip.flash_size_shift & 0xffff;
     checks.push(Check::new(
         "flash",
         format_args!("{kib} KiB"),

@@ -22,8 +22,9 @@ const BLOCKING: u32 = 2;
 /// # Errors
 /// [`StepError`] if the board does not answer.
 pub fn measure<P: Port>(bench: &mut Bench<P>) -> Result<Vec<Check>, StepError> {
-    let (start, length) = bench.chip()?.variables;
-    let addresses: Vec<u32> = (start..start + length).step_by(4).collect();
+    let chip = bench.chip()?;
+    let start = chip.variables_address;
+    let addresses: Vec<u32> = (start..start + chip.variables_bytes).step_by(4).collect();
     let mut header = None;
     for some in addresses.chunks(256) {
         let loads: Vec<Probe> = some

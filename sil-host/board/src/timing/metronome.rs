@@ -15,8 +15,10 @@ pub struct Metronome {
     controller: InProcess,
     pacer: Pacer,
     period: Duration,
-    lateness_ns: TickTimes,
-    missed_deadlines: u64,
+    /// Latencies of the wake-ups, ns.
+    pub lateness_ns: TickTimes,
+    /// Number of answers that were not ready when the next tick was due.
+    pub missed_deadlines: u64,
 }
 
 impl Metronome {
@@ -33,12 +35,6 @@ impl Metronome {
             lateness_ns: TickTimes::default(),
             missed_deadlines: 0,
         })
-    }
-
-    /// Returns the latencies of the wake-ups in ns, and the number of answers that were not ready
-    /// when the next tick was due.
-    pub fn finish(self) -> (TickTimes, u64) {
-        (self.lateness_ns, self.missed_deadlines)
     }
 }
 
@@ -87,9 +83,8 @@ mod tests {
         // Sleeping past several deadlines delays the following ticks.
         std::thread::sleep(Duration::from_millis(20));
         metronome.exchange(&SensorFrame::default()).unwrap();
-        let (lateness_ns, missed) = metronome.finish();
-        assert_eq!(lateness_ns.ticks(), 5);
-        assert!(lateness_ns.at_quantile(1.0) >= 17_000_000);
-        assert!(missed >= 1);
+        assert_eq!(metronome.lateness_ns.ticks(), 5);
+        assert!(metronome.lateness_ns.at_quantile(1.0) >= 17_000_000);
+        assert!(metronome.missed_deadlines >= 1);
     }
 }

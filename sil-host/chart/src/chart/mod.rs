@@ -8,7 +8,7 @@ use std::ops::Range;
 
 use crate::axis::label;
 use crate::canvas::{Anchor, Canvas};
-use crate::style::{HEADING, LABEL, SUBTITLE, TITLE, WIDTH, text_width, ticks, wrapped};
+use crate::style::{HEADING, LABEL, SUBTITLE, TITLE, Ticks, WIDTH, text_width, ticks, wrapped};
 use heading::{Heading, ROW};
 pub use mark::Mark;
 use placed::{Placed, x_pixel};
@@ -208,7 +208,7 @@ fn x_labels(
 /// Returns as many round numbers as have room along an axis.
 fn round_labels(x: &Range<f64>, sides: &Range<i32>) -> Vec<(f64, String)> {
     for count in (1..=10).rev() {
-        let (values, step) = ticks(x, count);
+        let Ticks { values, step } = ticks(x, count);
         let labels: Vec<_> = values
             .into_iter()
             .map(|value| (value, label(value, step)))

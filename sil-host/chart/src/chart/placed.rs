@@ -8,7 +8,7 @@ use super::{Chart, Panel, draw_x_axis, x_labels};
 use crate::axis::{ValueAxis, label};
 use crate::canvas::{Anchor, At, Canvas, Fill, Stroke};
 use crate::decimate::Extent;
-use crate::style::{Colour, GREY, GRID, LABEL, ticks, without_straight_ons};
+use crate::style::{Colour, GREY, GRID, LABEL, Ticks, ticks, without_straight_ons};
 
 /// Distance of the labels of the value axis from the panel, drawn units.
 const LABEL_GAP: i32 = 12;
@@ -175,7 +175,7 @@ impl Frame<'_, '_> {
         }
         let room = (self.bottom - self.top) / (LABEL.size * 13 / 10);
         let count = panel.y_ticks.min(room.max(1) as usize);
-        let (values, step) = ticks(&self.placed.axis.range, count);
+        let Ticks { values, step } = ticks(&self.placed.axis.range, count);
         let values = values.into_iter();
         values.map(|value| (value, label(value, step))).collect()
     }

@@ -8,7 +8,7 @@ mod spi;
 use self::dma::{Dma, Request};
 pub use self::rcc::Rcc;
 pub use self::spi::Spi;
-use crate::bit_band::bit_band;
+use crate::bit_band::{AliasedBit, bit_band};
 use crate::machine::{Chip, Reset};
 use crate::stm32::{
     Adc, AdcLayout, CONTROL_KEYS, Crystal, Dac, FlashSlots, Gpio, GpioReset, Individual,
@@ -455,7 +455,7 @@ impl<O: Outside> Chip for Stm32f4<O> {
     }
 
     fn read(&mut self, address: u32, size: u32, now: Picoseconds) -> u32 {
-        if let Some((word, bit)) = bit_band(address) {
+        if let Some(AliasedBit { word, bit }) = bit_band(address) {
             return self.load(word, now) >> bit & 1;
         }
         let word = match address.checked_sub(Self::SLOTS.0) {
@@ -474,7 +474,7 @@ impl<O: Outside> Chip for Stm32f4<O> {
     }
 
     fn write(&mut self, address: u32, size: u32, value: u32, now: Picoseconds) {
-        if let Some((word, bit)) = bit_band(address) {
+        if let Some(AliasedBit { word, bit }) = bit_band(address) {
             let before = self.load(word, now);
             return self.store(word, before & !(1 << bit) | (value & 1) << bit, now);
         }

@@ -11,7 +11,7 @@ pub use self::rcc::Rcc;
 use self::rcc::bus;
 pub use self::spi::Spi;
 use crate::Picoseconds;
-use crate::bit_band::bit_band;
+use crate::bit_band::{AliasedBit, bit_band};
 use crate::machine::{Chip, Reset};
 use crate::stm32::{
     Adc, AdcLayout, Crystal, Dac, FlashSlots, Gpio, GpioReset, Individual, Outside, Pin, PinLevel,
@@ -301,7 +301,7 @@ impl<O: Outside> Chip for Stm32g4<O> {
     }
 
     fn read(&mut self, address: u32, size: u32, now: Picoseconds) -> u32 {
-        if let Some((word, bit)) = bit_band(address) {
+        if let Some(AliasedBit { word, bit }) = bit_band(address) {
             return self.load(word, 4, now) >> bit & 1;
         }
         let word = match address.checked_sub(Self::SLOTS.0) {

@@ -95,7 +95,7 @@ impl Rig {
 
     /// Slides to and fro between these parts of the reach.
     pub fn slide(&mut self, posture: Posture, from: f64, to: f64) -> Slide {
-        let (reach, _) = painleve_identify::geometry::reach_m(&self.actual);
+        let reach = painleve_identify::geometry::reach_m(&self.actual);
         let steps = (reach * (to - from) / STEP_M) as usize;
         let there = (0..=steps).map(|step| from * reach + STEP_M * step as f64);
         let places: Vec<f64> = there.clone().chain(there.rev()).collect();
@@ -145,7 +145,7 @@ impl Rig {
 
     /// Returns the largest error of the tip's position by other parameters over the stretch in which it has to be known, m.
     pub fn tip_error_m(&self, found: &Parameters) -> f64 {
-        let (reach, _) = painleve_identify::geometry::reach_m(&self.actual);
+        let reach = painleve_identify::geometry::reach_m(&self.actual);
         let mut largest = 0.0_f64;
         for posture in [Posture::ElbowDown, Posture::ElbowUp] {
             for step in -20..=20 {

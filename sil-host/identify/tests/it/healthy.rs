@@ -1,6 +1,6 @@
 //! Healthy arms are identified, and their errors are as large as told.
 
-use painleve_identify::geometry::{Place, reach_m};
+use painleve_identify::geometry::{Place, reach_by, reach_m};
 use painleve_identify::{Limits, Parameter, Refusal, identify};
 use painleve_shared::Posture;
 
@@ -55,7 +55,7 @@ fn the_tip_is_as_far_off_as_its_deviation_says() {
     for seed in FIRST_SEED..FIRST_SEED + ARMS {
         let mut rig = Rig::of_prior(seed);
         let fit = identify(&rig.slides(), &rig.prior, &limits()).unwrap().fit;
-        let (reach_m, _) = reach_m(&rig.actual);
+        let reach_m = reach_m(&rig.actual);
         for (share, (sum, count)) in [0.6, 0.85].into_iter().zip(&mut squares) {
             for posture in [Posture::ElbowDown, Posture::ElbowUp] {
                 for tip_t_m in [-share * reach_m, share * reach_m] {
@@ -142,7 +142,7 @@ fn the_distance_from_the_edges_counts_the_posture_without_a_slide() {
     for slide in rig.slides() {
         let found = identify(&[slide], &rig.prior, &first_look).unwrap();
         let fit = &found.fit;
-        let (reach_m, reach_by) = reach_m(&fit.parameters);
+        let (reach_m, reach_by) = (reach_m(&fit.parameters), reach_by(&fit.parameters));
         for posture in [Posture::ElbowDown, Posture::ElbowUp] {
             for share in [-0.95, 0.95] {
                 let place = Place::on_belt(&fit.parameters, posture, share * reach_m).unwrap();

@@ -66,9 +66,18 @@ pub struct ForceCell {
     tangential_noise: Noise,
     normal_noise: Noise,
     /// Readings on their way, the oldest first.
-    delayed: VecDeque<(ForceCounts, ForceCounts)>,
+    delayed: VecDeque<ForceReading>,
     /// Channels of f_t and f_n.
     channels: [FaultyChannel; 2],
+}
+
+/// Readings of both channels in one tick.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ForceReading {
+    /// Reading of f_t.
+    pub tangential: ForceCounts,
+    /// Reading of f_n.
+    pub normal: ForceCounts,
 }
 
 impl ForceCell {
@@ -101,9 +110,9 @@ impl ForceCell {
     }
 
     /// Samples the contact force (f_t, f_n) in N at time `time_s`, once per tick, and returns the
-    /// readings (f_t, f_n) of this tick's frame.
+    /// readings of this tick's frame.
     #[inline]
-    pub fn read(&mut self, force_n: &Vector2<f64>, time_s: f64) -> (ForceCounts, ForceCounts) {
+    pub fn read(&mut self, force_n: &Vector2<f64>, time_s: f64) -> ForceReading {
         let settings = &self.settings;
         let [gain_t, gain_n] = settings.gain_error.map(|error| 1.0 + error);
         let [into_t, into_n] = settings.cross_talk;
@@ -121,8 +130,11 @@ impl ForceCell {
         let output = filtered + zero;
         let (tangential, _) = self.scale.counts(output.x + self.tangential_noise.draw());
         let (normal, _) = self.scale.counts(output.y + self.normal_noise.draw());
-        let reading = (ForceCounts(tangential), ForceCounts(normal));
-        let (tangential, normal) = if settings.delay_ticks == 0 {
+        let reading = ForceReading {
+            tangential: ForceCounts(tangential),
+            normal: ForceCounts(normal),
+        };
+        let reading = if settings.delay_ticks == 0 {
             reading
         } else {
             self.delayed.push_back(reading);
@@ -138,7 +150,10 @@ impl ForceCell {
             let passed = self.channels[channel].pass(time_s, i64::from(counts.0));
             ForceCounts(passed.clamp(-maximum - 1, maximum) as i32)
         };
-        (pass(0, tangential), pass(1, normal))
+        ForceReading {
+            tangential: pass(0, reading.tangential),
+            normal: pass(1, reading.normal),
+        }
     }
 }
 
@@ -162,8 +177,8 @@ mod tests {
     }
 
     fn newtons(cell: &mut ForceCell, force_n: [f64; 2], time_s: f64) -> [f64; 2] {
-        let (tangential, normal) = cell.read(&Vector2::from(force_n), time_s);
-        [tangential, normal].map(|counts| cell.scale.value(counts.0))
+        let reading = cell.read(&Vector2::from(force_n), time_s);
+        [reading.tangential, reading.normal].map(|counts| cell.scale.value(counts.0))
     }
 
     #[test]
@@ -173,9 +188,9 @@ mod tests {
             ..Default::default()
         };
         let mut cell = ForceCell::new(&settings, &ChannelFaults::default(), TICK_S, 1);
-        let (tangential, normal) = cell.read(&Vector2::new(-100.0, 10.0), 0.0);
-        assert_eq!(tangential, ForceCounts(-2048));
-        assert_eq!(normal, ForceCounts(1024));
+        let reading = cell.read(&Vector2::new(-100.0, 10.0), 0.0);
+        assert_eq!(reading.tangential, ForceCounts(-2048));
+        assert_eq!(reading.normal, ForceCounts(1024));
     }
 
     proptest! {

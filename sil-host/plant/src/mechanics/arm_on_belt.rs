@@ -11,6 +11,7 @@ use crate::plant::{ContactMode, Plant, PlantError, Probe, Snapshot, State};
 
 use super::belt::BeltSettings;
 use super::dop853::{Dop853Step, Tolerance};
+use super::effects::surface::SurfacePoint;
 use super::impact::ImpactLaw;
 use super::motion::{Evaluation, Motion, StateTerms, theta};
 use super::motion_error::MotionError;
@@ -93,7 +94,7 @@ impl ArmOnBelt {
             step: Box::new(Dop853Step::empty()),
         };
         let motion = plant.motion();
-        if let Some(on_belt) = motion.start_on_belt(&initial, |_| (0.0, 0.0))? {
+        if let Some(on_belt) = motion.start_on_belt(&initial, |_| SurfacePoint::default())? {
             let velocity = motion.relative_velocity_m_s(0.0, &on_belt);
             if velocity.y.abs() <= plant.solver.chatter_speed_m_s {
                 plant.state = motion.onto_belt(&on_belt);

@@ -234,7 +234,16 @@ pub enum ImpactKind {
     WithoutCollision,
 }
 
-/// Returns the state after an impact of the tip at belt height, and the impulse on the tip, (P_t, P_n), N·s.
+/// What an impact leads to.
+#[derive(Clone, Copy, Debug)]
+pub struct AfterImpact {
+    /// The state after it.
+    pub state: State,
+    /// Impulse on the tip, (P_t, P_n), N·s.
+    pub impulse_ns: Vector2<f64>,
+}
+
+/// Returns what an impact of the tip at belt height leads to.
 ///
 /// # Errors
 /// As [`collide`].
@@ -244,15 +253,17 @@ pub fn state_after(
     time_s: f64,
     state: &State,
     kind: ImpactKind,
-) -> Result<(State, Vector2<f64>), EndlessImpact> {
+) -> Result<AfterImpact, EndlessImpact> {
     let velocity = motion.relative_velocity_m_s(time_s, state);
     let q = motion.arm.inverse_tip_inertia(&Pose::new(&theta(state)));
     let impact = match kind {
         ImpactKind::Collision => collide(&q, motion.friction, law, velocity),
         ImpactKind::WithoutCollision => throw(&q, motion.friction, law, velocity.x),
     }?;
-    let after = motion.apply_impulse(state, &impact.impulse_ns);
-    Ok((after, impact.impulse_ns))
+    Ok(AfterImpact {
+        state: motion.apply_impulse(state, &impact.impulse_ns),
+        impulse_ns: impact.impulse_ns,
+    })
 }
 
 /// The rest of a collision: compression to its end, then restitution.

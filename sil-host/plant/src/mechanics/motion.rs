@@ -7,6 +7,7 @@ use painleve_shared::{Arm, ContactTerms, GeneralisedTorque, JointTorque, LinkMot
 use crate::plant::{ContactMode, Snapshot, State};
 
 use super::belt::BeltProfile;
+use super::effects::surface::SurfacePoint;
 use super::torque::TorqueSegment;
 use super::turned_pose::KnownPose;
 
@@ -353,14 +354,14 @@ impl Motion<'_> {
     }
 
     /// Returns the start with its tip on the belt, if the tip is at most 0.1 mm above it; `None` for a higher tip.
-    /// The belt's `surface` has a height above the flat belt (m) and a slope at each z_t (m).
+    /// `surface` is that of the belt at each z_t (m).
     ///
     /// # Errors
     /// [`OutOfRange`] if the tip is more than 1 mm inside the flat belt, or if the arm has to turn far.
     pub fn start_on_belt(
         &self,
         start: &State,
-        surface: impl Fn(f64) -> (f64, f64),
+        surface: impl Fn(f64) -> SurfacePoint,
     ) -> Result<Option<State>, OutOfRange> {
         let gap_m = self.gap_m(start);
         range::check(
@@ -369,7 +370,7 @@ impl Motion<'_> {
             -INSIDE_AT_START_M,
             self.arm.height_m() + self.arm.reach_m(),
         )?;
-        let gap_over = |state: &State| self.gap_m(state) - surface(self.tip_t_m(state)).0;
+        let gap_over = |state: &State| self.gap_m(state) - surface(self.tip_t_m(state)).height_m;
         if gap_m.min(gap_over(start)) >= CONTACT_AT_START_M {
             return Ok(None);
         }
@@ -390,18 +391,20 @@ impl Motion<'_> {
 
     /// Returns the nearest state with the tip at belt height and unchanged velocities.
     pub fn lowered_onto_belt(&self, state: &State) -> State {
-        self.lowered_onto(state, |_| (0.0, 0.0))
+        self.lowered_onto(state, |_| SurfacePoint::default())
     }
 
     #[inline]
-    fn lowered_onto(&self, state: &State, surface: impl Fn(f64) -> (f64, f64)) -> State {
+    fn lowered_onto(&self, state: &State, surface: impl Fn(f64) -> SurfacePoint) -> State {
         let mut state = *state;
         // Newton's method: two iterations remove any integration error to rounding; the others are
         // for initial conditions set by the user.
         for _ in 0..8 {
             let pose = Pose::new(&theta(&state));
-            let (height, slope) = surface(self.arm.tip_m(&pose).x);
-            let gap = self.arm.gap_m(&pose) - height;
+            let SurfacePoint {
+                height_m, slope, ..
+            } = surface(self.arm.tip_m(&pose).x);
+            let gap = self.arm.gap_m(&pose) - height_m;
             if gap.abs() < 1e-16 {
                 break;
             }

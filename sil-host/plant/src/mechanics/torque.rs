@@ -77,7 +77,7 @@ impl TorqueSegment {
     /// end, if `remaining` is that at its start. All are powers of one exponential, because the
     /// nodes are multiples of 1/40.
     #[inline]
-    pub fn remaining_in_step(&self, remaining: f64, size_s: f64) -> ([f64; NODES.len()], f64) {
+    pub fn remaining_in_step(&self, remaining: f64, size_s: f64) -> Remaining {
         let power_1 = libm::exp(-size_s / (40.0 * self.lag_s));
         let power_2 = power_1 * power_1;
         let power_3 = power_2 * power_1;
@@ -88,11 +88,20 @@ impl TorqueSegment {
         let power_32 = power_24 * power_8;
         let (power_35, power_40) = (power_32 * power_3, power_32 * power_8);
         let at_nodes = [power_8, power_12, power_24, power_40, power_35];
-        (
-            at_nodes.map(|power| remaining * power),
-            remaining * power_40,
-        )
+        Remaining {
+            at_nodes: at_nodes.map(|power| remaining * power),
+            at_end: remaining * power_40,
+        }
     }
+}
+
+/// Fractions of the change to the target that remain in a short step.
+#[derive(Clone, Copy, Debug)]
+pub struct Remaining {
+    /// At its stages.
+    pub at_nodes: [f64; NODES.len()],
+    /// At its end.
+    pub at_end: f64,
 }
 
 /// Response of the arm, frozen in one state, to the part of a torque that decays with the lag.
@@ -155,7 +164,8 @@ mod tests {
             3e-4,
         );
         let (start_s, size_s) = (2e-4, 1e-3);
-        let (at_nodes, at_end) = segment.remaining_in_step(segment.remaining(start_s), size_s);
+        let Remaining { at_nodes, at_end } =
+            segment.remaining_in_step(segment.remaining(start_s), size_s);
         let nodes = NODES.into_iter().chain([1.0]);
         for (node, fraction) in nodes.zip(at_nodes.into_iter().chain([at_end])) {
             let exact = segment.remaining(start_s + node * size_s);

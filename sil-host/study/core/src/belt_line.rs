@@ -140,8 +140,17 @@ pub fn positive_stretches(value: impl Fn(f64) -> f64) -> Vec<(f64, f64)> {
     stretches
 }
 
-/// Returns the τ at which `value` is smallest, and the value there.
-pub fn least(value: impl Fn(f64) -> f64) -> (f64, f64) {
+/// The smallest value of a function of τ.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Least {
+    /// Where it is.
+    pub tau: f64,
+    /// The value.
+    pub value: f64,
+}
+
+/// Returns where `value` is smallest, and the value there.
+pub fn least(value: impl Fn(f64) -> f64) -> Least {
     let points = samples(&value);
     let lowest = (0..points.len())
         .min_by(|&one, &other| points[one].1.total_cmp(&points[other].1))
@@ -149,12 +158,13 @@ pub fn least(value: impl Fn(f64) -> f64) -> (f64, f64) {
     let left = points[lowest.saturating_sub(1)].0;
     let right = points[(lowest + 1).min(points.len() - 1)].0;
     let tau = minimum(left, right, &value);
-    let refined = (tau, value(tau));
-    if refined.1 < points[lowest].1 {
-        refined
+    let refined = value(tau);
+    let (tau, value) = if refined < points[lowest].1 {
+        (tau, refined)
     } else {
         points[lowest]
-    }
+    };
+    Least { tau, value }
 }
 
 fn samples(value: impl Fn(f64) -> f64) -> Vec<(f64, f64)> {
@@ -268,8 +278,8 @@ mod tests {
 
     #[test]
     fn the_minimum_is_found_inside_and_at_the_ends() {
-        let (tau, value) = least(|t| 2.0 + (t - 0.1234).powi(2));
+        let Least { tau, value } = least(|t| 2.0 + (t - 0.1234).powi(2));
         assert!((tau - 0.1234).abs() < 1e-7 && value == 2.0, "{tau} {value}");
-        assert_eq!(least(|t| t).0, -core::f64::consts::FRAC_PI_2);
+        assert_eq!(least(|t| t).tau, -core::f64::consts::FRAC_PI_2);
     }
 }

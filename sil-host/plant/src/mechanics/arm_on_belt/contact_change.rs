@@ -85,15 +85,13 @@ impl ArmOnBelt {
     /// Carries out an impact and returns its impulse on the tip, (P_t, P_n), N·s.
     fn collide(&mut self, kind: ImpactKind) -> Result<[f64; 2], MotionError> {
         let motion = self.motion();
-        let (state, impulse_ns) =
-            impact::state_after(&motion, &self.impact, self.time_s, &self.state, kind).map_err(
-                |source| MotionError::EndlessImpact {
-                    time_s: self.time_s,
-                    source,
-                },
-            )?;
-        self.state = state;
-        Ok(impulse_ns.into())
+        let after = impact::state_after(&motion, &self.impact, self.time_s, &self.state, kind)
+            .map_err(|source| MotionError::EndlessImpact {
+                time_s: self.time_s,
+                source,
+            })?;
+        self.state = after.state;
+        Ok(after.impulse_ns.into())
     }
 
     fn change_mode(&mut self, mode: ContactMode, probe: &mut dyn ArmProbe) {

@@ -3,7 +3,7 @@
 use super::super::cash_karp::ShortStep;
 use super::super::dop853::Tolerance;
 use super::super::motion::{Evaluation, Motion, StateTerms, theta};
-use super::super::torque::LagResponse;
+use super::super::torque::{LagResponse, Remaining};
 use super::super::transition;
 use super::ArmOnBelt;
 use crate::plant::State;
@@ -50,7 +50,7 @@ impl ArmOnBelt {
             let settled = motion.under_torque(mode, start_s, torque.with_remaining(0.0), terms);
             let decaying = (here.slope - settled.slope) / remaining;
             let response = LagResponse::new(torque, &decaying);
-            let (at_nodes, at_end) = torque.remaining_in_step(remaining, size);
+            let Remaining { at_nodes, at_end } = torque.remaining_in_step(remaining, size);
             let derivative = |stage: usize, t: f64, x: &State| {
                 let remaining = at_nodes[stage];
                 let torque_nm = torque.with_remaining(remaining);

@@ -78,9 +78,9 @@ impl CompliantMotion<'_> {
         let surface = &self.effects.surface;
         if !surface.is_flat() {
             let along_m = self.along_belt_m(t_s, self.arm.tip_m(pose).x);
-            let (height_m, slope, speed_m_s) = surface.at(t_s, along_m);
-            surface_m += height_m;
-            closing_m_s += slope * slip_m_s + speed_m_s;
+            let here = surface.at(t_s, along_m);
+            surface_m += here.height_m;
+            closing_m_s += here.slope * slip_m_s + here.speed_m_s;
         }
         let friction = self.friction_at(t_s, self.arm.tip_m(pose).x);
         let depth_m = surface_m - self.arm.gap_m(pose);

@@ -108,10 +108,7 @@ impl CompliantArmOnBelt {
             budget: StepBudget::default(),
         };
         let motion = plant.motion().rigid(0.0, 0.0);
-        let on_belt = motion.start_on_belt(&initial, |tip_t_m| {
-            let (height_m, slope, _) = effects.surface.at(0.0, tip_t_m);
-            (height_m, slope)
-        })?;
+        let on_belt = motion.start_on_belt(&initial, |tip_t_m| effects.surface.at(0.0, tip_t_m))?;
         let start = on_belt.unwrap_or(initial);
         if on_belt.is_some() {
             let slip_m_s = motion.relative_velocity_m_s(0.0, &start).x;

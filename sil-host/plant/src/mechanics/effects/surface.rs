@@ -32,6 +32,17 @@ settings! {
     }
 }
 
+/// The surface at one place and time.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct SurfacePoint {
+    /// Height above the flat belt, m.
+    pub height_m: f64,
+    /// Slope along the belt.
+    pub slope: f64,
+    /// Vertical speed, m/s.
+    pub speed_m_s: f64,
+}
+
 impl Surface {
     /// Returns whether the belt is flat and does not vibrate.
     pub fn is_flat(&self) -> bool {
@@ -41,9 +52,8 @@ impl Surface {
             && self.vibration_m == 0.0
     }
 
-    /// Returns the height (m), the slope along the belt, and the vertical speed (m/s) at time `t_s`
-    /// and position `along_belt_m` on the belt.
-    pub fn at(&self, t_s: f64, along_belt_m: f64) -> (f64, f64, f64) {
+    /// Returns the surface at time `t_s` and position `along_belt_m` on the belt.
+    pub fn at(&self, t_s: f64, along_belt_m: f64) -> SurfacePoint {
         let (mut height, mut slope, mut speed) = (0.0, 0.0, 0.0);
         if self.waviness_m != 0.0 {
             let number = TAU / self.wave_length_m;
@@ -79,7 +89,11 @@ impl Surface {
             height += self.vibration_m * libm::sin(rate * t_s);
             speed += self.vibration_m * rate * libm::cos(rate * t_s);
         }
-        (height, slope, speed)
+        SurfacePoint {
+            height_m: height,
+            slope,
+            speed_m_s: speed,
+        }
     }
 }
 
@@ -103,11 +117,12 @@ mod tests {
             (2.0, -0.498),
             (2.5, 1.2),
         ] {
-            let (_, slope, speed) = surface.at(t, x);
-            let height = |t: f64, x: f64| surface.at(t, x).0;
+            let point = surface.at(t, x);
+            let height = |t: f64, x: f64| surface.at(t, x).height_m;
             let by_place = (height(t, x + 1e-7) - height(t, x - 1e-7)) / 2e-7;
             let by_time = (height(t + 1e-7, x) - height(t - 1e-7, x)) / 2e-7;
-            assert!((slope - by_place).abs() < 1e-6 && (speed - by_time).abs() < 1e-6);
+            assert!((point.slope - by_place).abs() < 1e-6);
+            assert!((point.speed_m_s - by_time).abs() < 1e-6);
         }
     }
 }

@@ -91,8 +91,8 @@ pub fn admissible(parameters: &ArmParameters<f64>, mu: f64) -> Result<Admissible
     let arm = Arm::new(*parameters)?;
     let critical = |posture| {
         let line = BeltLine::new(&arm, posture);
-        let (tau, friction) = least(|tau| line.friction_of_zero_p(tau, Slip::Positive));
-        (friction, line.tip_t_m(tau), posture)
+        let least = least(|tau| line.friction_of_zero_p(tau, Slip::Positive));
+        (least.value, line.tip_t_m(least.tau), posture)
     };
     let (up, down) = (critical(Posture::ElbowUp), critical(Posture::ElbowDown));
     let (critical_friction, critical_tip_t_m, critical_posture) =

@@ -131,7 +131,7 @@ fn jump(
             state = motion.onto_belt(&state);
         }
         // The plant has completed this impact, and so do its neighbours.
-        state = state_after(motion, law, time_s, &state, kind).map_or(state, |(state, _)| state);
+        state = state_after(motion, law, time_s, &state, kind).map_or(state, |after| after.state);
     }
     onto_manifold(motion, time_s, mode, &state)
 }

@@ -46,10 +46,10 @@ impl Figure for LoopOutcome {
         }
         panels.push(self.along_the_belt(&names));
         panels.push(self.steps());
-        let check = self.largest_difference().map_or(String::new(), |(gain, phase)| {
+        let check = self.largest_difference().map_or(String::new(), |most| {
             format!(
-                "\nLargest difference between sines (dots) and finite differences (lines): {:.1} % and {phase:.1}°",
-                100.0 * gain
+                "\nLargest difference between sines (dots) and finite differences (lines): {:.1} % and {:.1}°",
+                100.0 * most.gain_share, most.phase_deg
             )
         });
         Chart {

@@ -14,19 +14,33 @@ pub struct LoopOutcome {
     pub rows: Vec<Row>,
 }
 
+/// Largest differences between linearised and measured loops.
+#[derive(Clone, Copy, Debug)]
+pub struct Difference {
+    /// Of the gain, as a part of it.
+    pub gain_share: f64,
+    /// Of the phase, degrees.
+    pub phase_deg: f64,
+}
+
 impl LoopOutcome {
-    /// Returns the largest differences between linearised and measured loops: of the gain, relative, and of the
-    /// phase, degrees; `None` without any loop.
-    pub fn largest_difference(&self) -> Option<(f64, f64)> {
+    /// Returns the largest differences; `None` without any loop.
+    pub fn largest_difference(&self) -> Option<Difference> {
         let loops = self.rows.iter().flat_map(|row| &row.loops);
         let points = loops.flat_map(|one| &one.points);
         points
             .map(|point| {
                 let decibels = (point.measured_gain_db - point.gain_db).abs();
                 let degrees = (point.measured_phase_deg - point.phase_deg).abs();
-                (10_f64.powf(decibels / 20.0) - 1.0, degrees)
+                Difference {
+                    gain_share: 10_f64.powf(decibels / 20.0) - 1.0,
+                    phase_deg: degrees,
+                }
             })
-            .reduce(|one, other| (one.0.max(other.0), one.1.max(other.1)))
+            .reduce(|one, other| Difference {
+                gain_share: one.gain_share.max(other.gain_share),
+                phase_deg: one.phase_deg.max(other.phase_deg),
+            })
     }
 }
 

@@ -55,8 +55,10 @@ pub struct Stiffness {
     pub stiffnesses_n_m: Vec<f64>,
     /// Belt speeds of the window, m/s, in ascending order.
     pub v_belt: Grid,
-    /// Time before and during which bouncing is observed, s.
-    pub times_s: (f64, f64),
+    /// Time before bouncing is observed, s.
+    pub transient_s: f64,
+    /// Time during which it is observed, s.
+    pub record_s: f64,
 }
 
 /// One stiffness.
@@ -181,7 +183,11 @@ impl Stiffness {
     /// Returns whether the arm still leaves the belt from x0,a after the transient.
     fn bounces(&self, stiffness_n_m: Option<f64>, v_belt_m_s: f64) -> Result<bool, StudyError> {
         let failed = |source| self.failed(stiffness_n_m, source);
-        let (transient_s, record_s) = self.times_s;
+        let Self {
+            transient_s,
+            record_s,
+            ..
+        } = *self;
         let mut plant = self.plant(
             stiffness_n_m,
             v_belt_m_s,

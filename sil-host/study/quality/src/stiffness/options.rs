@@ -50,7 +50,8 @@ impl StudyOptions for Options {
             parameters: scenario.plant_parameters(),
             stiffnesses_n_m: self.stiffness.values().to_vec(),
             v_belt: self.v_belt.clone(),
-            times_s: (self.transient_s, self.record_s),
+            transient_s: self.transient_s,
+            record_s: self.record_s,
         };
         for &stiffness_n_m in self.stiffness.values() {
             study.contact(stiffness_n_m, study.sticking_mass_kg()?)?;

@@ -7,7 +7,8 @@ fn study() -> Stiffness {
         parameters: PlantParameters::default(),
         stiffnesses_n_m: vec![1e4, 1e5, 1e6, 1e7],
         v_belt: Grid::of(-0.4),
-        times_s: (2.0, 1.0),
+        transient_s: 2.0,
+        record_s: 1.0,
     }
 }
 

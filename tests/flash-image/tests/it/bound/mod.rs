@@ -282,8 +282,8 @@ fn sensor_interrupts<C: BoardChip>(bound: &Bound, tracer: &mut Tracer<'_>) {
             bench.tick();
             let traces = bench.board.machine.take_traces();
             let cycles = traces.iter().map(|it| {
-                let (instructions, waited) = without_waits(&bound.loops, it);
-                tracer.cost(&instructions).unwrap().cycles + waited
+                let busy = without_waits(&bound.loops, it);
+                tracer.cost(&busy.addresses).unwrap().cycles + busy.waited_cycles
             });
             let cycles: Vec<u32> = cycles.collect();
             executions += cycles.len();
