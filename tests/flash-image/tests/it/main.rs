@@ -4,6 +4,7 @@ mod accept;
 mod boot;
 mod bound;
 mod closed_loop;
+mod control_rates;
 mod dead_force_cell;
 mod drive;
 mod hazards;

@@ -7,7 +7,7 @@ mod chip;
 mod host;
 pub mod second_sensors;
 pub mod sensors;
-mod watchdogs;
+pub mod watchdogs;
 
 use painleve_chips::MILLISECOND;
 use painleve_flash_image::bench::{Bench, encoded, scenario};

@@ -59,7 +59,8 @@ fn a_finished_tick_feeds_the_watchdogs_in_time<C: BoardChip>() {
     assert_eq!(accepted, expected);
 }
 
-fn refusal<C: BoardChip>(tick_hz: u32) -> Option<RefusedRate> {
+/// Configures a board that has just booted with a control rate.
+pub fn refusal<C: BoardChip>(tick_hz: u32) -> Option<RefusedRate> {
     let mut board = booted::<C>(32_000, 0);
     match board.configure(FrameSource::Sensors, &encoded(&at_rate(tick_hz))) {
         Some(Response::Ready { .. }) => None,
