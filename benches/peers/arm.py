@@ -44,8 +44,8 @@ class Report:
         self.touches += 1
         self.last_touch_s = time_s
 
-    def write(self, simulated_s, settings):
-        """Prints the results."""
+    def write(self, simulated_s, version, settings):
+        """Prints the results, with the version of the program."""
         print(
             json.dumps(
                 {
@@ -55,6 +55,7 @@ class Report:
                     "last_touch_s": self.last_touch_s,
                     "apex_m": self.apex_m,
                     "max_theta1_dot_rad_s": self.max_theta1_dot_rad_s,
+                    "version": version,
                     "settings": settings,
                 }
             )

@@ -63,7 +63,8 @@ def main(simulated_s):
         was_touching = is_touching
     report.write(
         simulated_s,
-        f"MuJoCo {mujoco.__version__}, steps of {STEP_S * 1e3:g} ms, elliptic cone, time constant of two steps",
+        mujoco.__version__,
+        f"steps of {STEP_S * 1e3:g} ms, elliptic cone, time constant of two steps",
     )
 
 

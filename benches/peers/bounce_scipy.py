@@ -166,7 +166,7 @@ def main(simulated_s):
         x = impact(x, False)
         report.touch(time_s)
         mode = "flight" if tip_velocity(x)[1] > SLOWEST_M_S else contact_mode(x)
-    report.write(simulated_s, f"SciPy {scipy.__version__}, DOP853, rtol {RTOL:g}, atol {ATOL:g}")
+    report.write(simulated_s, scipy.__version__, f"DOP853, rtol {RTOL:g}, atol {ATOL:g}")
 
 
 main(float(sys.argv[1]))

@@ -48,7 +48,7 @@ def main(simulated_s):
             was_touching = is_touching
             simulation.nextStep()
             steps += 1
-        report.write(steps * STEP_S, f"Debian's python3-siconos, Moreau-Jean, Newton's law with e = {arm.RESTITUTION}, steps of {STEP_S * 1e3:g} ms")
+        report.write(steps * STEP_S, "", f"Moreau-Jean, Newton's law with e = {arm.RESTITUTION}, steps of {STEP_S * 1e3:g} ms")
 
 
 main(float(sys.argv[1]))

@@ -3,11 +3,12 @@
 
     cargo build --release && python3 benches/peers/run.py
 
-Prints a Markdown table of simulated seconds per CPU second. SciPy and MuJoCo go into a virtual
-environment of their own below target/; Siconos comes from Debian (apt-get install
-python3-siconos). A program that cannot be installed or does not run is reported as missing.
+Prints a Markdown table of simulated seconds per CPU second, or, with --json, an object for each program. SciPy and
+MuJoCo go into a virtual environment of their own below target/; Siconos comes from Debian (apt-get install
+python3-siconos). The table reports a program that cannot be installed or does not run as missing; --json fails.
 """
 
+import argparse
 import json
 import resource
 import subprocess
@@ -25,10 +26,10 @@ PAINLEVE = TARGET / "release" / "painleve"
 PAINLEVE_S, SCIPY_S, MUJOCO_S, SICONOS_S = 20_000, 60, 100, 30
 
 PARADOX = {
-    "painleve": "decided by the signs of p and b: impact without collision, Routh's process in closed form",
-    "SciPy": "the same rules, reimplemented with `solve_ivp` and its events",
-    "MuJoCo": "not reproduced: contact is soft and convex, and penetration throws the tip off; the subsequent motion depends on softness and step",
-    "Siconos": "not reproduced: one impulse per step under Newton's impact law; the inconsistent state appears as an impulse",
+    "painleve": "decided by the signs of p and b, in closed form",
+    "SciPy": "the same rules with `solve_ivp` and its events",
+    "MuJoCo": "not reproduced: soft, convex contact throws the tip off, depending on softness and step",
+    "Siconos": "not reproduced: one impulse per step under Newton's impact law; the bounce dies out",
 }
 
 
@@ -55,6 +56,7 @@ def painleve():
         "touches_per_s": row["impacts_per_s"],
         "apex_m": row["apex_m"],
         "max_theta1_dot_rad_s": row["max_theta1_dot_rad_s"],
+        "version": "",
         "settings": "DOP853 with located events, relative tolerance 1e-09; start of the program included",
     }
 
@@ -71,17 +73,40 @@ def siconos():
     python = "/usr/bin/python3"
     if subprocess.run([python, "-c", "import siconos.kernel"], capture_output=True).returncode:
         raise RuntimeError("not installed; on Debian: apt-get install python3-siconos")
-    return peer(python, "bounce_siconos.py", SICONOS_S)
+    asked = ["dpkg-query", "--show", "--showformat=${Version}", "python3-siconos"]
+    version = subprocess.run(asked, capture_output=True, text=True).stdout.split("+")[0]
+    return {**peer(python, "bounce_siconos.py", SICONOS_S), "version": version}
+
+
+def measured(name, measure):
+    """The figures of a program, for docs/measured/."""
+    result = measure()
+    speed = result["simulated_s"] / result["cpu_s"]
+    return {
+        "version": result["version"],
+        # A whole number where a fraction says nothing.
+        "simulated_s_per_cpu_s": round(speed) if speed > 100 else speed,
+        "touches_per_s": result["touches_per_s"],
+        "apex_m": result["apex_m"],
+        "paradox": PARADOX[name],
+    }
 
 
 def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--json", action="store_true")
+    options = parser.parse_args()
     if not PAINLEVE.exists():
         sys.exit(f"there is no {PAINLEVE}: run cargo build --release")
     one_thread_each()
+    programs = {"painleve": painleve, "SciPy": scipy, "MuJoCo": mujoco, "Siconos": siconos}
+    if options.json:
+        print(json.dumps({name: measured(name, measure) for name, measure in programs.items()}))
+        return
     print("| program | simulated s per CPU s | painleve is faster by | impacts per s | apex | largest θ̇₁ | the paradox |")
     print("|---|---|---|---|---|---|---|")
     ours, notes = None, []
-    for name, measure in {"painleve": painleve, "SciPy": scipy, "MuJoCo": mujoco, "Siconos": siconos}.items():
+    for name, measure in programs.items():
         try:
             result = measure()
         except (RuntimeError, OSError, subprocess.CalledProcessError) as error:
@@ -92,7 +117,7 @@ def main():
         speed = result["simulated_s"] / result["cpu_s"]
         ours = ours or speed
         last = f"; last touch at {result['last_touch_s']:.1f} s" if "last_touch_s" in result else ""
-        notes.append(f"{name}: {result['simulated_s']:g} s simulated{last}; {result['settings']}.")
+        notes.append(f"{name} {result['version']}: {result['simulated_s']:g} s simulated{last}; {result['settings']}.")
         print(
             f"| {name} | {speed:,.{0 if speed > 100 else 1}f} | {ours / speed:,.0f} × | {result['touches_per_s']:.1f} "
             f"| {result['apex_m'] * 1e3:.1f} mm | {result['max_theta1_dot_rad_s']:.2f} rad/s | {PARADOX[name]} |",

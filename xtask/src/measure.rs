@@ -3,8 +3,7 @@
 //! Each file of `docs/measured/` declares its entries: a name, a label for tables, the command, and which fields of the
 //! command's JSON are kept. This chore executes the commands and writes each `result` into its file as soon as it is
 //! finished. An entry that the present sources have measured is skipped, so that an interrupted measurement goes on
-//! where it stopped. The pages then take their figures from these files. An entry that keeps nothing belongs to a command
-//! without JSON, and its result is copied by hand.
+//! where it stopped. The pages then take their figures from these files.
 
 use std::collections::HashMap;
 use std::collections::hash_map::Entry::{Occupied, Vacant};
@@ -36,7 +35,7 @@ pub struct MeasureArguments {
 const HEAD: &str = "# Names, labels, commands and `keep` are written by hand, each `result` by `cargo xtask measure`.\n\n";
 
 /// Tests that write figures into the pages: the name here, the package and the test. They compare them in every run.
-const BLOCKS: [(&str, &str, &str); 4] = [
+const BLOCKS: [(&str, &str, &str); 6] = [
     ("ticks", "painleve-tests", "the_image_"),
     ("bound", "painleve-tests", "a_tick_has_bounds"),
     (
@@ -49,17 +48,29 @@ const BLOCKS: [(&str, &str, &str); 4] = [
         "painleve-flash-image",
         "ticks_begin_within_the_bound",
     ),
+    (
+        "stuck-sensors",
+        "painleve-flash-image",
+        "a_stuck_sensor_does",
+    ),
+    (
+        "control-rates",
+        "painleve-flash-image",
+        "a_board_accepts_the_control_rates",
+    ),
 ];
 
 /// The chore that measures times beside those of others.
 const BENCH: &str = "bench";
 
 /// The commands that draw the pages' figures of results, named `figures`.
-const FIGURES: [&str; 4] = [
+const FIGURES: [&str; 6] = [
     "run edge --no-record --plot docs/images/edge.svg",
     "run capture --no-record --plot docs/images/capture.svg",
     "study sliding-range --mu 0.4,0.6,0.8 --reference minimum-jerk:3,ramp:2 --svg docs/images/sliding-range.svg",
     "study lift-off --seed 7001508 --runs 1200 --svg docs/images/lift-off.svg",
+    "study stiffness --svg docs/images/stiffness.svg",
+    "study ringing --svg docs/images/ringing.svg",
 ];
 
 /// A file of entries.
@@ -97,17 +108,12 @@ pub fn run(arguments: &MeasureArguments) -> Result<(), ChoreError> {
             let command = text(&entry, "command")?.to_owned();
             let source = entry.get("result").and_then(|result| result.get("source"));
             let is_finished = source.and_then(toml::Value::as_str) == Some(&here.source);
-            let is_by_hand = !entry.contains_key("keep");
             if arguments.list {
-                let state = match (is_by_hand, is_finished) {
-                    (true, _) => format!("copied by hand from `{command}`"),
-                    (_, true) => "measured".into(),
-                    _ => "missing".into(),
-                };
+                let state = if is_finished { "measured" } else { "missing" };
                 say(&format!("{whole}: {state}"))?;
                 continue;
             }
-            if is_by_hand || is_finished && !arguments.again && !arguments.quick {
+            if is_finished && !arguments.again && !arguments.quick {
                 continue;
             }
             let command = if arguments.quick {
@@ -274,11 +280,18 @@ impl Here {
         Ok(here)
     }
 
-    /// Executes a `painleve` command and returns the object that it prints.
+    /// Executes a command and returns the object that it prints; `painleve` is the program under test.
     fn answer(&self, command: &str) -> Result<Value, ChoreError> {
         eprintln!("$ {command}");
-        let arguments: Vec<&str> = command.split_whitespace().skip(1).collect();
-        let printed = answer(&program().to_string_lossy(), &arguments)?;
+        let mut words = command.split_whitespace();
+        let name = words.next().unwrap_or_default();
+        let built = program();
+        let started = if name == "painleve" {
+            built.to_string_lossy()
+        } else {
+            name.into()
+        };
+        let printed = answer(&started, &words.collect::<Vec<_>>())?;
         serde_json::from_str(&printed).map_err(|cause| ChoreError(format!("`{command}`: {cause}")))
     }
 
@@ -369,6 +382,38 @@ mod tests {
         assert_eq!(with_fewer_runs("painleve run edge"), "painleve run edge");
     }
 
+    /// Pictures that `figures` does not draw, and where they come from.
+    const OTHER_PICTURES: [(&str, &str); 11] = [
+        ("smoothness", "a test draws it from docs/measured"),
+        (
+            "work-precision",
+            "a test draws it from its benchmark's rows",
+        ),
+        ("bounce", "docs/images/bounce.py"),
+        ("ablation", "the lab book"),
+        ("effects-rigid", "the lab book"),
+        ("effects-compliant", "the lab book"),
+        ("arm", "by hand"),
+        ("tick", "by hand"),
+        ("wiring", "by hand"),
+        ("wiring-bare-board", "by hand"),
+        ("wiring-two-sensors", "by hand"),
+    ];
+
+    #[test]
+    fn every_picture_has_something_that_draws_it() {
+        let drawn = FIGURES.iter().map(|it| it.rsplit('/').next().unwrap_or(it));
+        let others = OTHER_PICTURES.iter().map(|(name, _)| format!("{name}.svg"));
+        let mut known: Vec<String> = drawn.map(String::from).chain(others).collect();
+        known.sort();
+        let folder = fs::read_dir(workspace().join("docs/images")).expect("pictures");
+        let names = folder.map(|entry| entry.expect("a picture").file_name());
+        let names = names.map(|name| name.to_string_lossy().into_owned());
+        let mut present: Vec<String> = names.filter(|name| name.ends_with(".svg")).collect();
+        present.sort();
+        assert_eq!(present, known);
+    }
+
     #[test]
     fn every_file_declares_entries_with_names_of_their_own() {
         for file in read_files().unwrap_or_else(|error| panic!("{error}")) {
@@ -379,6 +424,11 @@ mod tests {
                 for key in ["label", "command"] {
                     assert!(text(&entry, key).is_ok(), "{}: {key}", file.name);
                 }
+                assert!(
+                    entry.get("keep").is_some_and(toml::Value::is_table),
+                    "{}: without `keep` this is copied by hand: {entry}",
+                    file.name
+                );
                 names.extend(text(&entry, "name").map(str::to_owned));
             }
             names.sort();
