@@ -1,4 +1,4 @@
-//! Chores of the workspace, as `cargo xtask …`; one local command equals CI.
+//! Chores of the workspace, as `cargo xtask …`.
 
 mod bench;
 mod boards;

@@ -50,6 +50,15 @@ pub struct ForceCellDriver {
     count: usize,
 }
 
+/// Readings of both forces; [`ReadError`] in place of one that is lost for this tick.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ForceReadings {
+    /// f_t, along the belt.
+    pub tangential: Result<ForceCounts, ReadError>,
+    /// f_n, across it.
+    pub normal: Result<ForceCounts, ReadError>,
+}
+
 impl ForceCellDriver {
     /// Makes the first force cell, in mode 0, no faster than [`FASTEST_HZ`], with select 0: f_n on channels 0 (+)
     /// and 1 (−), f_t on 2 (+) and 3 (−). The second has select 1.
@@ -71,20 +80,10 @@ impl ForceCellDriver {
         };
     }
 
-    /// Returns (f_t, f_n) of the last set of readings, from the live zero, as counts of `bits` bits: those of the
+    /// Returns the last set of readings, from the live zero, as counts of `bits` bits: those of the
     /// second converter if only that is read, else those of the first. Each force takes two conversions, and a
     /// third if these two disagree. A code outside the range that `mounting` allows is no reading.
-    ///
-    /// # Errors
-    /// [`ReadError`] in place of a reading that is lost for this tick.
-    pub fn readings(
-        &self,
-        bits: u8,
-        mounting: &Mounting,
-    ) -> (
-        Result<ForceCounts, ReadError>,
-        Result<ForceCounts, ReadError>,
-    ) {
+    pub fn readings(&self, bits: u8, mounting: &Mounting) -> ForceReadings {
         let [first_n, first_t, second_n, second_t] = self.readings;
         let (tangential, normal) = match self.parts {
             SensorParts::First | SensorParts::Both => (first_t, first_n),
@@ -94,7 +93,10 @@ impl ForceCellDriver {
             let force = from_live_zero(reading, mounting)?;
             Ok(ForceCounts(rescale(force, BITS, bits)))
         };
-        (scaled(tangential), scaled(normal))
+        ForceReadings {
+            tangential: scaled(tangential),
+            normal: scaled(normal),
+        }
     }
 
     /// Returns f_t and f_n, each by the first and by the second converter, from the live zero, in counts of

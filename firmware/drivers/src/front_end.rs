@@ -14,7 +14,7 @@ use crate::ReadError;
 use crate::TURNS;
 use crate::checks::{Checks, Verdict};
 use crate::encoders::EncoderDriver;
-use crate::force_cell::ForceCellDriver;
+use crate::force_cell::{ForceCellDriver, ForceReadings};
 use crate::gap::{GapCheck, Scales};
 use crate::heating::HeatingModel;
 use crate::plausibility::{Implausible, SensorReadings};
@@ -218,7 +218,8 @@ impl FrontEnd {
             SensorParts::Second => mounting.second_force_reversed,
         };
         let [tare_t, tare_n] = mounting.force_tare;
-        let (tangential, normal) = force_cell.readings(settings.force.bits, mounting);
+        let ForceReadings { tangential, normal } =
+            force_cell.readings(settings.force.bits, mounting);
         self.readings.forces = [
             tangential.ok().map(|it| balanced(it, tare_t, reversed_t)),
             normal.ok().map(|it| balanced(it, tare_n, reversed_n)),

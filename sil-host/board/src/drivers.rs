@@ -128,14 +128,14 @@ impl Drivers {
     fn read(&mut self, frame: &SensorFrame) -> SensorFrame {
         self.present(frame);
         let joints = self.encoders.read().readings(self.encoder_bits);
-        let (tangential, normal) = self
+        let force = self
             .force_cell
             .read()
             .readings(self.force_bits, &self.mounting);
         SensorFrame {
             joints: joints.map(|it| it.unwrap_or(EncoderCounts::MISSING)),
-            normal_force: normal.unwrap_or(ForceCounts::MISSING),
-            tangential_force: tangential.unwrap_or(ForceCounts::MISSING),
+            normal_force: force.normal.unwrap_or(ForceCounts::MISSING),
+            tangential_force: force.tangential.unwrap_or(ForceCounts::MISSING),
             ..*frame
         }
     }

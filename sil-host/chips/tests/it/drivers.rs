@@ -9,7 +9,7 @@ use painleve_chips::{As5048a, BitErrors, BridgeAmplifier, BridgeFailure, Mcp3304
 use painleve_drivers::ReadError;
 use painleve_drivers::encoders::{self, EncoderDriver};
 use painleve_drivers::exchange::PolledDriver;
-use painleve_drivers::force_cell::{self, ForceCellDriver};
+use painleve_drivers::force_cell::{self, ForceCellDriver, ForceReadings};
 use painleve_shared::counts::{EncoderCounts, ForceCounts};
 use painleve_shared::mounting::{Mounting, SensorParts};
 
@@ -56,12 +56,7 @@ fn channels([n_plus, n_minus]: [i32; 2], [t_plus, t_minus]: [i32; 2]) -> [i32; 8
 }
 
 /// Reads f_t and f_n.
-fn forces(
-    driver: &mut TestedForceCell,
-) -> (
-    Result<ForceCounts, ReadError>,
-    Result<ForceCounts, ReadError>,
-) {
+fn forces(driver: &mut TestedForceCell) -> ForceReadings {
     driver
         .read()
         .readings(force_cell::BITS, &Mounting::default())
@@ -85,7 +80,10 @@ fn forces_of_either_sign_are_read() {
     for force in -1966..=1965 {
         let (normal, tangential) = (BRIDGE.channels(force), BRIDGE.channels(-force - 1));
         part.borrow_mut().channels = channels(normal, tangential);
-        let expected = (Ok(ForceCounts(-force - 1)), Ok(ForceCounts(force)));
+        let expected = ForceReadings {
+            tangential: Ok(ForceCounts(-force - 1)),
+            normal: Ok(ForceCounts(force)),
+        };
         assert_eq!(forces(&mut driver), expected);
     }
     assert!(part.borrow().violations().is_empty());
@@ -101,7 +99,10 @@ fn a_dead_axis_of_the_force_cell_gives_no_reading() {
         };
         for force in (-1966..=1965).step_by(100) {
             part.borrow_mut().channels = channels(dead.channels(force), BRIDGE.channels(7));
-            let expected = (Ok(ForceCounts(7)), Err(ReadError::Implausible));
+            let expected = ForceReadings {
+                tangential: Ok(ForceCounts(7)),
+                normal: Err(ReadError::Implausible),
+            };
             assert_eq!(forces(&mut driver), expected, "{failure:?} at {force}");
         }
     }
@@ -113,7 +114,7 @@ fn a_force_beyond_the_range_gives_no_reading() {
     let (mut driver, part) = force_cell();
     for force in [-2100, -1967, 1966, 2100] {
         part.borrow_mut().channels = channels(BRIDGE.channels(force), BRIDGE.channels(0));
-        assert_eq!(forces(&mut driver).1, Err(ReadError::Implausible));
+        assert_eq!(forces(&mut driver).normal, Err(ReadError::Implausible));
     }
 }
 
@@ -154,7 +155,10 @@ fn second_sensors_are_read() {
     force_parts[1].borrow_mut().channels = channels(BRIDGE.channels(7), BRIDGE.channels(-8));
     assert_eq!(
         forces(&mut force_driver),
-        (Ok(ForceCounts(-8)), Ok(ForceCounts(7)))
+        ForceReadings {
+            tangential: Ok(ForceCounts(-8)),
+            normal: Ok(ForceCounts(7)),
+        }
     );
 }
 
@@ -181,9 +185,9 @@ fn dead_lines_give_no_reading_or_a_recognisably_dead_one() {
     );
     let (mut driver, part) = force_cell();
     part.borrow_mut().dead = Some(true);
-    assert_eq!(forces(&mut driver).0, Err(ReadError::NotZero));
+    assert_eq!(forces(&mut driver).tangential, Err(ReadError::NotZero));
     part.borrow_mut().dead = Some(false);
-    assert_eq!(forces(&mut driver).0, Err(ReadError::Implausible));
+    assert_eq!(forces(&mut driver).tangential, Err(ReadError::Implausible));
 }
 
 #[test]
@@ -240,8 +244,8 @@ fn with_bit_errors_a_reading_is_correct_or_missing() {
                 Err(_) => lost += 1,
             }
         }
-        let (t, n) = forces(&mut force_driver);
-        for (reading, force) in [(t, tangential), (n, normal)] {
+        let read = forces(&mut force_driver);
+        for (reading, force) in [(read.tangential, tangential), (read.normal, normal)] {
             match reading {
                 Ok(counts) => assert_eq!(counts.0, force, "tick {tick}"),
                 Err(_) => lost += 1,
