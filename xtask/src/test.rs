@@ -65,13 +65,22 @@ pub fn run(arguments: &TestArguments) -> Result<(), ChoreError> {
         Tools::Default
     };
     let missing = setup::install_missing(tools)?;
-    build_fw::run()?;
-    examples::own_firmware()?;
-    if arguments.all {
-        examples::own_law_image()?;
-    }
-    build_program()?;
-    size::check_images()?;
+    let images = || {
+        build_fw::run()?;
+        examples::own_firmware()?;
+        if arguments.all {
+            examples::own_law_image()?;
+        }
+        size::check_images()
+    };
+    // Beside each other: the images' link-time optimisation keeps one processor busy.
+    let (images, programs) = std::thread::scope(|scope| {
+        let images = scope.spawn(images);
+        let programs = build_program();
+        (images.join(), programs)
+    });
+    images.map_err(|_| ChoreError("the images: a thread panicked".into()))??;
+    programs?;
     let mut left_out: Vec<String> = missing
         .iter()
         .map(|tool| format!("tests that use {tool}: it cannot be installed"))
