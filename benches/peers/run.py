@@ -39,7 +39,7 @@ def peer(python, script, simulated_s):
 
 def painleve():
     arguments = "study bifurcation --mu 0.6 --v-belt=-0.4 --initial a --threads 1 --json".split()
-    arguments += ["--transient-s", "0", "--record-s", str(PAINLEVE_S), "--relative-tolerance", "1e-9"]
+    arguments += ["--transient-s", "0.001", "--record-s", str(PAINLEVE_S), "--relative-tolerance", "1e-9"]
 
     def cpu_s():
         usage = resource.getrusage(resource.RUSAGE_CHILDREN)
