@@ -132,6 +132,7 @@ pub fn run<P: Plant>(
             .map_or(0.0, |start_s| trial.time_s() - start_s),
         torque_change_moving_nm: smoothness.moving.torque_change_nm(converters),
         torque_change_holding_nm: smoothness.holding.torque_change_nm(converters),
+        torque_reversals: smoothness.holding.reversals(),
         force_ripple_n: smoothness.holding.force_ripple_n(),
         tip_t_m: trial.tip_t_m(),
         target_m,

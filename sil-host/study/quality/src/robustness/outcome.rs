@@ -57,6 +57,8 @@ pub struct RobustnessOutcome {
     pub torque_change_moving_nm: Option<Percentiles>,
     /// The same while it stands.
     pub torque_change_holding_nm: Option<Percentiles>,
+    /// Part of these changes, standing, that reverse the one before, 0 to 1.
+    pub torque_reversals: Option<Percentiles>,
     /// Standard deviation of the normal force while it stands, N.
     pub force_ripple_n: Option<Percentiles>,
     /// Number of runs with each ending.
@@ -101,6 +103,7 @@ impl RobustnessOutcome {
             ),
             torque_change_moving_nm: of(|row| row.torque_change_moving_nm),
             torque_change_holding_nm: of(|row| row.torque_change_holding_nm),
+            torque_reversals: of(|row| row.torque_reversals),
             force_ripple_n: of(|row| row.force_ripple_n),
             endings,
             false_alarms: rows.iter().map(|row| row.false_alarms).sum(),
@@ -156,6 +159,11 @@ impl Outcome for RobustnessOutcome {
                 "torque change, holding (mN·m)",
                 1e3,
                 &self.torque_change_holding_nm,
+            ),
+            (
+                "reversals of torque, holding (%)",
+                1e2,
+                &self.torque_reversals,
             ),
             ("force ripple, holding (N)", 1.0, &self.force_ripple_n),
         ] {

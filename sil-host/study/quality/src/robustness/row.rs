@@ -96,6 +96,8 @@ pub struct Row {
     pub torque_change_moving_nm: Option<f64>,
     /// The same while it stands.
     pub torque_change_holding_nm: Option<f64>,
+    /// Part of these changes, standing, that reverse the one before, 0 to 1.
+    pub torque_reversals: Option<f64>,
     /// Standard deviation of the normal force while it stands, N.
     pub force_ripple_n: Option<f64>,
     /// Final tip position, m.

@@ -26,6 +26,7 @@ pub(super) fn row(index: usize, ending: Ending, error_m: f64) -> Row {
         slid_s: if is_captured { 360.0 } else { 0.0 },
         torque_change_moving_nm: Some(0.01 * number),
         torque_change_holding_nm: Some(0.02 * number),
+        torque_reversals: is_captured.then_some(0.2),
         force_ripple_n: is_captured.then_some(0.03),
         tip_t_m: 0.1,
         target_m: Some(0.1 + error_m),
