@@ -191,7 +191,6 @@ impl<L: Law> Configuration<L> {
     /// [`OutOfRange`] for the first setting that is out of range. Its key is relative to
     /// [`settings`](Self::settings), as in `law.hybrid.normal_force_n`, or begins with `tick_hz`,
     /// `arm` or `converters`.
-    // Out of line: the errors do not share the stack with the controller being built.
     #[inline(never)]
     pub fn validate(&self) -> Result<Arm<f32>, OutOfRange> {
         range::check("tick_hz", self.tick_hz, 10.0, 1e5)?;

@@ -75,7 +75,7 @@ impl<L: Law> TorqueDemand<L> {
             tick_s: self.tick_s,
         };
         if starts {
-            // Few ticks reset, and out of line: the copy spares all others to store the input in memory.
+            // The copy spares every other tick to store the input in memory.
             let copy = input;
             self.law.reset(&mut self.law_state, &copy);
         }

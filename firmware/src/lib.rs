@@ -4,7 +4,8 @@
 //! The controller does not depend on its host. The same source is flashed to the microcontroller,
 //! linked into the simulation and run under an emulator, and gives the same bits everywhere: single
 //! precision, no fused multiply-add, sine and cosine from `painleve-shared`. Nothing here
-//! allocates, panics or loops without bound.
+//! allocates, panics or loops without bound. Why functions are out of line and structures in the order of C stands in
+//! docs/controller.md, *Generated code*.
 //!
 //! The modules follow the order of one tick: [`controller`] checks the frame; [`estimate`] converts
 //! counts to angles, rates, contact and friction; [`supervise`] decides which actions are allowed;

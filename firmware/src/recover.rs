@@ -83,7 +83,6 @@ impl Flight {
 impl RecoverySettings {
     /// Computes the torques for one tick of `tick_s` (s) in the air, with the admissible `stretch`; until it
     /// is known the tip is held above the belt.
-    // Out of line: its code in the controller's would take registers from every tick.
     #[inline(never)]
     pub fn tick(
         &self,

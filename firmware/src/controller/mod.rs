@@ -76,8 +76,6 @@ use crate::telemetry::Telemetry;
 /// assert_eq!(answer.torques.map(|torque| torque.0), [0, 0]);
 /// # Ok::<(), painleve_shared::range::OutOfRange>(())
 /// ```
-// In this order: a Cortex-M4F loads floats only from the first kilobyte after a pointer. What a tick needs less of
-// comes last.
 #[derive(Clone, Debug)]
 #[repr(C)]
 pub struct Controller<L: Law = LawSettings> {
@@ -133,7 +131,6 @@ impl<L: Law> Controller<L> {
 
     /// Answers one sensor frame: the first part of a tick, after which the torque can go out. The second part is
     /// [`update`](Self::update).
-    // Out of line, because the compiler then finds fewer values that have to wait on the stack.
     #[inline(never)]
     pub fn answer(&mut self, frame: &SensorFrame) -> &ActuatorFrame {
         self.answer_into(frame, None);
@@ -158,7 +155,6 @@ impl<L: Law> Controller<L> {
         self.stages.prepare();
     }
 
-    // Out of line: the bound on an answer's cycles leaves it out, because it proves that the update is in time.
     #[cold]
     #[inline(never)]
     fn catch_up(&mut self) {

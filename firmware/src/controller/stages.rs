@@ -29,7 +29,6 @@ use crate::telemetry::Telemetry;
 use crate::torque_output::TorqueOutput;
 
 /// The stages of a tick, each with its settings, and their state between ticks.
-// In this order: see the fields of the controller.
 #[derive(Clone, Debug)]
 #[repr(C)]
 pub struct Stages<L: Law> {
@@ -160,10 +159,6 @@ impl<L: Law> Stages<L> {
     }
 
     /// Updates the estimates with the tick that has been answered, and the slow ones and the edges in turn.
-    ///
-    /// Contact and flight have branches of their own: each excludes the other's work, as the bound on the update's
-    /// cycles can see.
-    // Out of line, because the bound leaves it out of a tick that has started the estimates.
     #[inline(never)]
     pub fn learn(&mut self) {
         let turn = self.turn.take();

@@ -233,7 +233,6 @@ impl FrictionEstimator {
         }
     }
 
-    // Out of line: few readings can decide before their tick is answered.
     #[inline(never)]
     fn observe_slip(&mut self, estimate: &mut FrictionEstimate, force_n: &Vector2<f32>) {
         let slip = Slip::of(-force_n.x);

@@ -43,7 +43,6 @@ impl JointFriction {
     }
 
     /// Returns the change of the friction in one tick, as a torque on the links, N·m, given the joint angles q', rad.
-    // Out of line: few arms need it.
     #[inline(never)]
     pub fn tick(&mut self, angles_rad: &JointMotion<f32>) -> GeneralisedTorque<f32> {
         let before_rad = self.angles_rad.replace(*angles_rad).unwrap_or(*angles_rad);

@@ -184,7 +184,6 @@ impl JointEstimator {
     }
 
     /// Predicts the ticks of frames that have not arrived.
-    // Out of line, because few ticks need it.
     #[inline(never)]
     fn bridge(&mut self, acceleration_rad_s2: &JointMotion<f32>, elapsed_ticks: u32) {
         self.predict_over(acceleration_rad_s2, elapsed_ticks - self.predicted_ticks);
@@ -192,7 +191,6 @@ impl JointEstimator {
 
     /// Leaves out the whole turns by which a joint of an arm without torque has been turned: targets are within half a turn
     /// of zero.
-    // Out of line: a drive that is on does not need it.
     #[inline(never)]
     pub fn unwind(&mut self) {
         let Some(readings) = self.readings else {

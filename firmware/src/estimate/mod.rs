@@ -299,7 +299,6 @@ impl Estimators {
     }
 
     /// Updates the disturbance.
-    // Out of line: contact and flight both contain it.
     #[inline(never)]
     fn balance_torques(&mut self) {
         let contact = &self.contact;

@@ -175,7 +175,6 @@ macro_rules! law_set {
                 states
             }
 
-            // Out of line: few ticks reset a law, and its code there would take registers from every tick.
             #[inline(never)]
             fn reset(&self, state: &mut $states, input: &$crate::law::LawInput<'_>) {
                 match self {

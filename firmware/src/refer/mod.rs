@@ -143,7 +143,6 @@ impl References {
     }
 
     /// Continues the search for the edges of the admissible stretch around the tip.
-    // Out of line: two kinds of tick contain it.
     #[inline(never)]
     pub fn search(&mut self, estimates: &Estimators) {
         self.governor.search(

@@ -53,8 +53,7 @@ fn affordable(
     }
 }
 
-/// Kept out of line because it is rarely needed: when inlined, the compiler computes the divisions
-/// every time instead of branching.
+/// Returns the largest such fraction, up to 1, without a least one.
 #[cold]
 #[inline(never)]
 fn affordable_part(
