@@ -203,6 +203,17 @@ mod tests {
     }
 
     #[test]
+    fn without_tolerance_readings_change_nothing() {
+        let mut calibration = calibration();
+        calibration.calibrator.deviation_m = 0.0;
+        for gap in [0.0, gap_m(0.2205, 0.21)] {
+            assert_eq!(calibration.update(gap), 0.21);
+        }
+        assert_eq!(calibration.calibrator.gap_error_m(50e-6), 50e-6);
+        assert!(!calibration.calibrator.is_open());
+    }
+
+    #[test]
     fn a_length_beyond_tolerance_or_not_finite_is_refused() {
         for gap in [gap_m(0.25, 0.21), f32::NAN, f32::INFINITY, HEIGHT_M] {
             assert_eq!(calibration().update(gap), 0.21);
