@@ -1,8 +1,8 @@
 //! `cargo xtask examples`: builds, runs and tests every example in Rust.
 
 use crate::build_fw;
-use crate::command::{ChoreError, run_cargo};
-use crate::under_test::PROFILE;
+use crate::command::{self, ChoreError, run_cargo};
+use crate::under_test::{PROFILE, built};
 
 /// Target folder of the firmware that is not ours, which is no member of the workspace.
 const TARGET: &str = "target/examples";
@@ -43,6 +43,9 @@ fn own_firmware_for(chips: &[(&str, &str)]) -> Result<(), ChoreError> {
     Ok(())
 }
 
+/// Programs with a law and a plant of one's own, members of the workspace.
+const PROGRAMS: [&str; 2] = ["own-law", "own-plant"];
+
 /// Builds the image with a law of its own.
 ///
 /// # Errors
@@ -76,10 +79,13 @@ pub fn run() -> Result<(), ChoreError> {
     let test = ["test", "--lib", "--target-dir", TARGET];
     run_cargo(&[&test[..], &OF_OWN_FIRMWARE].concat())?;
     own_law_image()?;
-    for example in ["own-law", "own-plant"] {
-        let of_example = ["--profile", PROFILE, "--package", example];
-        run_cargo(&[&["run"], &of_example[..]].concat())?;
-        run_cargo(&[&["test"], &of_example[..], &["--", "--include-ignored"]].concat())?;
+    // Of the whole workspace, so that no dependency is built again with other features.
+    let workspace = ["--workspace", "--profile", PROFILE];
+    let [law, plant] = PROGRAMS;
+    run_cargo(&[&["build"], &workspace[..], &["--bin", law, "--bin", plant]].concat())?;
+    for example in PROGRAMS {
+        command::run(&built(example).to_string_lossy(), &[])?;
     }
-    Ok(())
+    let test = ["--test", "command", "--", "--include-ignored"];
+    run_cargo(&[&["test"], &workspace[..], &test].concat())
 }

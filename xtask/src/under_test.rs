@@ -24,7 +24,8 @@ pub fn chaos() -> PathBuf {
     built(CHAOS)
 }
 
-fn built(name: &str) -> PathBuf {
+/// Returns the path of a program that is built with the profile of the tests.
+pub fn built(name: &str) -> PathBuf {
     workspace().join("target").join(PROFILE).join(name)
 }
 
