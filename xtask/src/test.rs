@@ -1,7 +1,7 @@
 //! `cargo xtask test`: the tests, in two tiers.
 //!
-//! The default tier holds every promise once, on one of the two chips, with a sample of kills: it is for every change. `--all`
-//! adds campaigns, searches and whole procedures, which take seconds to minutes each, and what requires further tools.
+//! The default tier is for every change: units, hazards, equal bits, runs of several processes, budgets and docs, on one of the
+//! two chips, and a sample of kills. `--all` adds campaigns, searches and whole procedures, and what requires further tools.
 //! The last lines name the tier, what it left out, and why.
 
 use std::fs;
