@@ -69,6 +69,12 @@ const BETTER: f64 = 0.5;
 /// those of the arm may lift a tip that presses less.
 const ATTEMPTS_N: [f64; 3] = [FORCE_N, 1.25 * FORCE_N, 1.5 * FORCE_N];
 
+/// Normal force that ends a slide, N: three times that of the last attempt.
+const MOST_FORCE_N: f32 = 18.0;
+
+/// Time for which it has to last, s. The impact of a landing is shorter.
+const PRESSES_S: f64 = 0.01;
+
 /// A tick of a slide.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct SlideTick {
@@ -104,6 +110,15 @@ impl Slid {
         let is_done = answer.flags.contains(StatusFlags::REFERENCE_DONE);
         self.is_complete |= is_done && state == Some(SupervisorState::Tracking);
     }
+
+    /// Returns whether the tip has last pressed so hard, and for so long, that its slide has to end.
+    pub fn presses_too_hard(&self, scenario: &Scenario) -> bool {
+        let count = libm::ceil(PRESSES_S * f64::from(scenario.run.tick_hz)).max(1.0) as usize;
+        // At most the end of the force cell's range.
+        let (most, _) = scenario.converters.scales().force.counts(MOST_FORCE_N);
+        let mut last = self.ticks.iter().rev().take(count);
+        self.ticks.len() >= count && last.all(|tick| tick.sensor.normal_force.0 >= most)
+    }
 }
 
 /// An arm whose controller slides its tip, and its operator.
@@ -112,7 +127,8 @@ pub trait SlideRig {
     type Error: std::error::Error;
 
     /// Has the tip set down in a posture and the belt run as the scenario says, runs the controller with its settings and
-    /// reference, and returns the ticks from the start of the reference to its end, or until the tip was lost.
+    /// reference, and returns the ticks from the start of the reference to its end, or until the tip was lost or
+    /// [presses too hard](Slid::presses_too_hard).
     ///
     /// # Errors
     /// If the operator gives up, or the rig or its drive fails.
@@ -366,10 +382,19 @@ pub fn identify_arm<R: SlideRig>(
     let mut slides = Vec::new();
     let mut slide = |known: &Scenario, share: f64, postures: [Posture; 2]| {
         for posture in postures {
+            let index = slides.len();
             let mut attempt = |force_n| {
                 let program = slide_scenario(known, share, posture, force_n)?;
                 let slid = rig.slide(&program, posture);
                 let slid = slid.map_err(IdentificationError::Rig)?;
+                if slid.presses_too_hard(&program) {
+                    let most_n = f64::from(MOST_FORCE_N);
+                    return Err(Refusal::PressedTooHard {
+                        slide: index,
+                        most_n,
+                    }
+                    .into());
+                }
                 let whole = if slid.is_complete {
                     slid.ticks.len()
                 } else {

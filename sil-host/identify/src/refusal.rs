@@ -74,6 +74,17 @@ pub enum Refusal {
         /// Index of the slide.
         slide: usize,
     },
+    /// The tip pressed too hard, and the slide was ended.
+    #[error(
+        "slide {}: the tip pressed on the belt with {most_n:.0} N or more, and the torque was taken off; see what it catches on, and check masses and springs in arm_model",
+        .slide + 1
+    )]
+    PressedTooHard {
+        /// Index of the slide.
+        slide: usize,
+        /// Force that ends a slide, N.
+        most_n: f64,
+    },
     /// Too many ticks have no reading of some sensor, or none that the scenario's sensors give.
     #[error(
         "slide {}: {percent:.0} % of the ticks lack a reading or torque that the scenario's converters can give; check the sensors' lines, and bits in converters.encoder, converters.force and converters.torque",

@@ -51,9 +51,9 @@ impl BoardSlides {
     }
 
     /// Collects the ticks of one slide.
-    fn slid(&self, arm: &mut ConnectedArm, duration: Duration) -> Result<Slid, BoardRigError> {
+    fn slid(&self, arm: &mut ConnectedArm, scenario: &Scenario) -> Result<Slid, BoardRigError> {
         let start = Instant::now();
-        let limit = duration + LIMIT;
+        let limit = Duration::from_secs_f64(scenario.run.duration_s) + LIMIT;
         let mut slid = Slid::default();
         while start.elapsed() < limit {
             self.operator.attend()?;
@@ -72,7 +72,7 @@ impl BoardSlides {
                 continue;
             };
             slid.push(sensor, &answer);
-            if slid.is_complete {
+            if slid.is_complete || slid.presses_too_hard(scenario) {
                 return Ok(slid);
             }
             if !slid.ticks.is_empty() && answer.supervisor_state() == Some(SupervisorState::Idle) {
@@ -111,8 +111,7 @@ impl SlideRig for BoardSlides {
             "operator: open the switch ENABLE, then close it, and let go when the drive takes the arm over; when the slide ends, \
              the torque goes off: be ready to hold the arm, and stop the belt",
         );
-        let duration = Duration::from_secs_f64(scenario.run.duration_s);
-        let slid = self.slid(&mut arm, duration);
+        let slid = self.slid(&mut arm, scenario);
         // Whatever ended the slide, the torque goes off; a board that cannot be reached takes it off by itself.
         let stopped = arm.stop();
         warn(match stopped {

@@ -152,6 +152,9 @@ impl<P: Plant> SlideRig for SimulatedSlides<P> {
                 break;
             }
             slide.push(frame, &answer);
+            if slide.presses_too_hard(&slid) {
+                break;
+            }
             let mut force = LargestForce(0.0);
             simulation.advance(Some(&answer), &mut force)?;
             if !slide.ticks.is_empty() {

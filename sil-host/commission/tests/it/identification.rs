@@ -247,6 +247,20 @@ fn a_slide_that_ends_early_is_repeated_and_refused_if_none_is_whole() {
     assert_eq!(attempts, 6);
 }
 
+/// The elbow's spring is six times as stiff as the drawing says.
+#[test]
+fn a_tip_that_presses_too_hard_ends_the_slide_at_once() {
+    let scenario = Scenario::default();
+    let mut actual = imperfect(&scenario, 51_000).unwrap();
+    actual.arm.stiffness_nm_rad[1] *= 6.0;
+    let mut rig = SimulatedSlides::new(actual, None);
+    let refused = identify_arm(&mut rig, &scenario, &drawn()).map(|_| ());
+    let Err(IdentificationError::Refused(Refusal::PressedTooHard { slide: 0, .. })) = refused
+    else {
+        panic!("{refused:?}");
+    };
+}
+
 #[test]
 fn slides_keep_the_scenarios_own_gains() {
     let of = |override_of_law: &str| {
