@@ -22,7 +22,7 @@ use painleve_identify::{
 use painleve_plant::decimal::as_written;
 use painleve_plant::mechanics::motion::theta;
 use painleve_plant::scenario::{Knowledge, Scenario, ScenarioError};
-use painleve_shared::counts::{EncoderScale, TorqueCounts};
+use painleve_shared::counts::{EncoderScale, ForceCounts, TorqueCounts};
 use painleve_shared::frame::{ActuatorFrame, SensorFrame, StatusFlags};
 use painleve_shared::status::SupervisorState;
 use painleve_shared::{Arm, ArmParameters, LinkMotion, OutOfRange, Pose, Posture};
@@ -114,11 +114,16 @@ impl Slid {
     /// Returns whether the tip has last pressed so hard, and for so long, that its slide has to end.
     pub fn presses_too_hard(&self, scenario: &Scenario) -> bool {
         let count = libm::ceil(PRESSES_S * f64::from(scenario.run.tick_hz)).max(1.0) as usize;
-        // At most the end of the force cell's range.
-        let (most, _) = scenario.converters.scales().force.counts(MOST_FORCE_N);
+        let most = most_force(scenario);
         let mut last = self.ticks.iter().rev().take(count);
-        self.ticks.len() >= count && last.all(|tick| tick.sensor.normal_force.0 >= most)
+        self.ticks.len() >= count && last.all(|tick| tick.sensor.normal_force.0 >= most.0)
     }
+}
+
+/// Returns the normal force that ends a slide: at most the end of the force cell's range.
+fn most_force(scenario: &Scenario) -> ForceCounts {
+    let (counts, _) = scenario.converters.scales().force.counts(MOST_FORCE_N);
+    ForceCounts(counts)
 }
 
 /// An arm whose controller slides its tip, and its operator.
@@ -388,7 +393,8 @@ pub fn identify_arm<R: SlideRig>(
                 let slid = rig.slide(&program, posture);
                 let slid = slid.map_err(IdentificationError::Rig)?;
                 if slid.presses_too_hard(&program) {
-                    let most_n = f64::from(MOST_FORCE_N);
+                    let force = program.converters.scales().force;
+                    let most_n = f64::from(force.value(most_force(&program).0));
                     return Err(Refusal::PressedTooHard {
                         slide: index,
                         most_n,

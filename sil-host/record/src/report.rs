@@ -346,11 +346,14 @@ const UNKNOWN_PLACE: &str = "the tip is known to controller.estimator.tip_deviat
 
 /// Returns how far the tip rests from the edge that holds its reference back, m.
 fn to_edge_m(scenario: &Scenario, result: &LoopResult) -> Option<f64> {
+    if !result.at_edge {
+        return None;
+    }
     let mut distance = ParadoxDistance::new(scenario).ok()?;
     let edge_m = distance
         .measure(&result.final_theta_rad, result.final_p_per_kg)
         .edge_m;
-    (result.at_edge && edge_m.is_finite()).then_some(edge_m)
+    edge_m.is_finite().then_some(edge_m)
 }
 
 /// Returns by how much the governor's distance is larger because the arm is not known exactly, m.
