@@ -8,6 +8,8 @@
 //! The belt's waves and vibration, and whatever else the controller does not know, accelerate the tip by some a. The normal
 //! force ripples by a/p, as the slides show. In use, the governor keeps p so large that the ripple leaves most of the force.
 
+mod slid;
+
 use core::convert::Infallible;
 
 use painleve_firmware::estimate::encoder_correction::EncoderCorrection;
@@ -22,10 +24,9 @@ use painleve_identify::{
 use painleve_plant::decimal::as_written;
 use painleve_plant::mechanics::motion::theta;
 use painleve_plant::scenario::{Knowledge, Scenario, ScenarioError};
-use painleve_shared::counts::{EncoderScale, ForceCounts, TorqueCounts};
-use painleve_shared::frame::{ActuatorFrame, SensorFrame, StatusFlags};
-use painleve_shared::status::SupervisorState;
 use painleve_shared::{Arm, ArmParameters, LinkMotion, OutOfRange, Pose, Posture};
+
+pub use slid::{Slid, SlideTick, Surprise, readings};
 
 /// Normal force of a slide, N.
 pub const FORCE_N: f64 = 4.0;
@@ -69,63 +70,6 @@ const BETTER: f64 = 0.5;
 /// those of the arm may lift a tip that presses less.
 const ATTEMPTS_N: [f64; 3] = [FORCE_N, 1.25 * FORCE_N, 1.5 * FORCE_N];
 
-/// Normal force that ends a slide, N: three times that of the last attempt.
-const MOST_FORCE_N: f32 = 18.0;
-
-/// Time for which it has to last, s. The impact of a landing is shorter.
-const PRESSES_S: f64 = 0.01;
-
-/// A tick of a slide.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct SlideTick {
-    /// The readings.
-    pub sensor: SensorFrame,
-    /// The torques that answered them.
-    pub torques: [TorqueCounts; 2],
-}
-
-/// What an arm has slid.
-#[derive(Clone, Debug, Default)]
-pub struct Slid {
-    /// The ticks in which the drive was tracking or had lost the belt, in order of time.
-    pub ticks: Vec<SlideTick>,
-    /// Whether the reference has come to its end.
-    pub is_complete: bool,
-}
-
-impl Slid {
-    /// Keeps a tick if it belongs to the slide.
-    pub fn push(&mut self, sensor: SensorFrame, answer: &ActuatorFrame) {
-        let state = answer.supervisor_state();
-        if !matches!(
-            state,
-            Some(SupervisorState::Tracking | SupervisorState::LiftOff)
-        ) {
-            return;
-        }
-        self.ticks.push(SlideTick {
-            sensor,
-            torques: answer.torques,
-        });
-        let is_done = answer.flags.contains(StatusFlags::REFERENCE_DONE);
-        self.is_complete |= is_done && state == Some(SupervisorState::Tracking);
-    }
-
-    /// Returns whether the tip has last pressed so hard, and for so long, that its slide has to end.
-    pub fn presses_too_hard(&self, scenario: &Scenario) -> bool {
-        let count = libm::ceil(PRESSES_S * f64::from(scenario.run.tick_hz)).max(1.0) as usize;
-        let most = most_force(scenario);
-        let mut last = self.ticks.iter().rev().take(count);
-        self.ticks.len() >= count && last.all(|tick| tick.sensor.normal_force.0 >= most.0)
-    }
-}
-
-/// Returns the normal force that ends a slide: at most the end of the force cell's range.
-fn most_force(scenario: &Scenario) -> ForceCounts {
-    let (counts, _) = scenario.converters.scales().force.counts(MOST_FORCE_N);
-    ForceCounts(counts)
-}
-
 /// An arm whose controller slides its tip, and its operator.
 pub trait SlideRig {
     /// Failure of the rig.
@@ -133,7 +77,7 @@ pub trait SlideRig {
 
     /// Has the tip set down in a posture and the belt run as the scenario says, runs the controller with its settings and
     /// reference, and returns the ticks from the start of the reference to its end, or until the tip was lost or
-    /// [presses too hard](Slid::presses_too_hard).
+    /// there is a [surprise](Slid::surprise).
     ///
     /// # Errors
     /// If the operator gives up, or the rig or its drive fails.
@@ -249,48 +193,6 @@ pub fn limits(scenario: &Scenario) -> Limits {
     }
 }
 
-/// Returns the readings of ticks, by the scenario's zeros and scales. Ticks without all readings, or with torques that no stage
-/// gives, are left out. Encoders on the motors lead their joints by the twist of the gears under the torque of the tick before.
-pub fn readings(scenario: &Scenario, ticks: impl IntoIterator<Item = SlideTick>) -> Vec<Reading> {
-    let scales = scenario.converters.scales();
-    let [scale_1, scale_2] = scales.encoders;
-    let newtons = f64::from(scales.force.per_count());
-    let newton_metres = f64::from(scales.torque.per_count());
-    let is_whole = |frame: &SensorFrame| {
-        scale_1.contains(frame.joints[0])
-            && scale_2.contains(frame.joints[1])
-            && scales.force.contains(frame.normal_force.0)
-            && scales.force.contains(frame.tangential_force.0)
-    };
-    let soft_rad_nm = scenario.controller.estimator.gear_compliance_rad_nm;
-    let rad = |scale: EncoderScale, reading| {
-        f64::from(scale.counts_from_zero(reading)) * scale.rad_per_count::<f64>()
-    };
-    let mut before_nm = None;
-    ticks
-        .into_iter()
-        .filter_map(|SlideTick { sensor, torques }| {
-            if !torques.iter().all(|it| scales.torque.contains(it.0)) {
-                before_nm = None;
-                return None;
-            }
-            let torque_nm = torques.map(|torque| f64::from(torque.0) * newton_metres);
-            let twisting_nm = before_nm.replace(torque_nm).unwrap_or(torque_nm);
-            let twist_rad = |joint: usize| f64::from(soft_rad_nm[joint]) * twisting_nm[joint];
-            is_whole(&sensor).then(|| Reading {
-                tick: sensor.tick,
-                encoders_rad: [
-                    rad(scale_1, sensor.joints[0]) - twist_rad(0),
-                    rad(scale_2, sensor.joints[1]) - twist_rad(1),
-                ],
-                force_n: [sensor.tangential_force, sensor.normal_force]
-                    .map(|force| f64::from(force.0) * newtons),
-                torque_nm,
-            })
-        })
-        .collect()
-}
-
 /// Returns the slide of ticks in a posture, of the ticks that a `whole` one has.
 pub fn slide_of(
     scenario: &Scenario,
@@ -392,14 +294,8 @@ pub fn identify_arm<R: SlideRig>(
                 let program = slide_scenario(known, share, posture, force_n)?;
                 let slid = rig.slide(&program, posture);
                 let slid = slid.map_err(IdentificationError::Rig)?;
-                if slid.presses_too_hard(&program) {
-                    let force = program.converters.scales().force;
-                    let most_n = f64::from(force.value(most_force(&program).0));
-                    return Err(Refusal::PressedTooHard {
-                        slide: index,
-                        most_n,
-                    }
-                    .into());
+                if let Some(surprise) = slid.surprise(&program) {
+                    return Err(surprise.refusal(index).into());
                 }
                 let whole = if slid.is_complete {
                     slid.ticks.len()

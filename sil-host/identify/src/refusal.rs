@@ -85,6 +85,17 @@ pub enum Refusal {
         /// Force that ends a slide, N.
         most_n: f64,
     },
+    /// The tip moved too fast, and the slide was ended.
+    #[error(
+        "slide {}: the tip moved faster than {most_m_s} m/s, and the torque was taken off; see whether the tip is on the belt and what throws it, and check masses and springs in arm_model",
+        .slide + 1
+    )]
+    MovedTooFast {
+        /// Index of the slide.
+        slide: usize,
+        /// Speed that ends a slide, m/s.
+        most_m_s: f64,
+    },
     /// Too many ticks have no reading of some sensor, or none that the scenario's sensors give.
     #[error(
         "slide {}: {percent:.0} % of the ticks lack a reading or torque that the scenario's converters can give; check the sensors' lines, and bits in converters.encoder, converters.force and converters.torque",

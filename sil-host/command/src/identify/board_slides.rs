@@ -72,7 +72,7 @@ impl BoardSlides {
                 continue;
             };
             slid.push(sensor, &answer);
-            if slid.is_complete || slid.presses_too_hard(scenario) {
+            if slid.is_complete || slid.surprise(scenario).is_some() {
                 return Ok(slid);
             }
             if !slid.ticks.is_empty() && answer.supervisor_state() == Some(SupervisorState::Idle) {

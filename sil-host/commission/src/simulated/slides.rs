@@ -152,7 +152,7 @@ impl<P: Plant> SlideRig for SimulatedSlides<P> {
                 break;
             }
             slide.push(frame, &answer);
-            if slide.presses_too_hard(&slid) {
+            if slide.surprise(&slid).is_some() {
                 break;
             }
             let mut force = LargestForce(0.0);

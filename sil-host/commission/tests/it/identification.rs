@@ -7,7 +7,7 @@ mod mujoco;
 mod mujoco_arm;
 
 use painleve_commission::identification::{
-    Found, IdentificationError, Slid, SlideRig, SlideTick, identify_arm, prior, readings,
+    Found, IdentificationError, Slid, SlideRig, SlideTick, Surprise, identify_arm, prior, readings,
     slide_scenario,
 };
 use painleve_commission::set_down::SetDown;
@@ -22,7 +22,7 @@ use painleve_plant::Plant;
 use painleve_plant::mechanics::BuiltInPlant;
 use painleve_plant::mechanics::motion::theta;
 use painleve_plant::scenario::Scenario;
-use painleve_shared::counts::TorqueCounts;
+use painleve_shared::counts::{EncoderCounts, ForceCounts, TorqueCounts};
 use painleve_shared::frame::SensorFrame;
 use painleve_shared::{Arm, ArmParameters, Pose, Posture};
 use painleve_study_core::case::{ControllerChoice, at_rest_on_belt};
@@ -247,18 +247,83 @@ fn a_slide_that_ends_early_is_repeated_and_refused_if_none_is_whole() {
     assert_eq!(attempts, 6);
 }
 
-/// The elbow's spring is six times as stiff as the drawing says.
-#[test]
-fn a_tip_that_presses_too_hard_ends_the_slide_at_once() {
+/// Changes an arm, and returns why it is refused.
+fn refusal_of(change: impl Fn(&mut Scenario)) -> Refusal {
     let scenario = Scenario::default();
     let mut actual = imperfect(&scenario, 51_000).unwrap();
-    actual.arm.stiffness_nm_rad[1] *= 6.0;
+    change(&mut actual);
     let mut rig = SimulatedSlides::new(actual, None);
-    let refused = identify_arm(&mut rig, &scenario, &drawn()).map(|_| ());
-    let Err(IdentificationError::Refused(Refusal::PressedTooHard { slide: 0, .. })) = refused
-    else {
-        panic!("{refused:?}");
+    match identify_arm(&mut rig, &scenario, &drawn()).map(|_| ()) {
+        Err(IdentificationError::Refused(refusal)) => refusal,
+        other => panic!("{other:?}"),
+    }
+}
+
+/// The elbow's spring is six times as stiff as the drawing says; then both stages give twice their torque.
+#[test]
+fn a_tip_that_presses_too_hard_or_moves_too_fast_ends_the_slide_at_once() {
+    let pressed = refusal_of(|actual| actual.arm.stiffness_nm_rad[1] *= 6.0);
+    assert!(
+        matches!(pressed, Refusal::PressedTooHard { slide: 0, .. }),
+        "{pressed}"
+    );
+    let moved = refusal_of(|actual| actual.converters.torque.error.gain = [1.0; 2]);
+    assert!(
+        matches!(moved, Refusal::MovedTooFast { slide: 0, .. }),
+        "{moved}"
+    );
+}
+
+/// Ticks of an arm whose elbow turns at a rate, with a normal force.
+fn turning(rate_rad_s: f64, force: ForceCounts, ticks: impl Iterator<Item = u32>) -> Slid {
+    let scale = Scenario::default().converters.scales().encoders[1];
+    let tick = |tick: u32| SlideTick {
+        sensor: SensorFrame {
+            tick,
+            joints: [
+                EncoderCounts(0),
+                scale.reading(rate_rad_s * f64::from(tick) * 1e-3),
+            ],
+            normal_force: force,
+            ..SensorFrame::default()
+        },
+        ..SlideTick::default()
     };
+    Slid {
+        ticks: ticks.map(tick).collect(),
+        is_complete: false,
+    }
+}
+
+#[test]
+fn a_surprise_lasts_and_is_seen_whatever_ticks_arrive() {
+    let scenario = Scenario::default();
+    let force = scenario.converters.scales().force;
+    let [soft, hard] = [4.0, 18.0].map(|force_n| ForceCounts(force.counts(force_n).0));
+    let of = |slid: Slid| slid.surprise(&scenario);
+    let is_hard = |slid: Slid| matches!(of(slid), Some(Surprise::PressesTooHard { .. }));
+    let is_fast = |slid: Slid| matches!(of(slid), Some(Surprise::MovesTooFast { .. }));
+    // A link of 0.2 m or so; the serial line may carry one tick of four.
+    for every in [1, 4] {
+        let ticks = |count| (0..count).step_by(every);
+        assert!(is_hard(turning(0.0, hard, ticks(20))));
+        assert!(is_fast(turning(3.0, soft, ticks(40))));
+        assert_eq!(of(turning(1.0, soft, ticks(40))), None);
+        assert_eq!(of(turning(3.0, hard, ticks(8))), None);
+    }
+    assert_eq!(of(Slid::default()), None);
+    // Two impacts, with the line silent between them.
+    assert_eq!(of(turning(0.0, hard, [0, 200].into_iter())), None);
+    // What is missing presses on nothing.
+    assert_eq!(of(turning(0.0, ForceCounts::MISSING, 0..40)), None);
+    // A reading that is wrong seems to throw the tip there and back, and a landing presses for some ticks.
+    for wrong in 0..40 {
+        let mut slid = turning(1.0, soft, 0..40);
+        let sensor = &mut slid.ticks[wrong].sensor;
+        sensor.joints[1] = EncoderCounts(sensor.joints[1].0 ^ 0x400);
+        sensor.normal_force = hard;
+        assert_eq!(of(slid), None, "{wrong}");
+    }
 }
 
 #[test]
