@@ -18,6 +18,7 @@ use painleve_identify::geometry::joint_rad;
 use painleve_identify::parameters::Drawn;
 use painleve_identify::passes::ON_BELT;
 use painleve_identify::torques::{Estimate, Joints};
+use painleve_identify::verdict::{check_friction, misread};
 use painleve_identify::{
     Identified, Limits, Parameter, Parameters, Prior, Reading, Refusal, Slide, identify,
 };
@@ -294,23 +295,30 @@ pub fn identify_arm<R: SlideRig>(
                 let program = slide_scenario(known, share, posture, force_n)?;
                 let slid = rig.slide(&program, posture);
                 let slid = slid.map_err(IdentificationError::Rig)?;
-                if let Some(surprise) = slid.surprise(&program) {
-                    return Err(surprise.refusal(index).into());
-                }
+                let surprise = slid.surprise(&program);
                 let whole = if slid.is_complete {
                     slid.ticks.len()
                 } else {
                     program.run.ticks() as usize
                 };
                 let slide = slide_of(scenario, posture, slid.ticks, whole);
-                Ok::<_, IdentificationError<R::Error>>(slide)
+                if let Some(surprise) = surprise {
+                    let misread = misread(&slide, &prior, &limits);
+                    return Err(misread.unwrap_or(surprise.refusal(index)).into());
+                }
+                let belt_m_s = program.belt.profile.speed_m_s(0.0);
+                Ok::<_, IdentificationError<R::Error>>((slide, belt_m_s))
             };
             let [first_n, others_n @ ..] = ATTEMPTS_N;
-            let mut slide = attempt(first_n)?;
+            let (mut slide, mut belt_m_s) = attempt(first_n)?;
             for force_n in others_n {
                 if slide.share_on_belt(&limits) < ON_BELT {
-                    slide = attempt(force_n)?;
+                    (slide, belt_m_s) = attempt(force_n)?;
                 }
+            }
+            // What is left of a lost tip is refused for another reason.
+            if slide.share_on_belt(&limits) >= ON_BELT {
+                check_friction(index, &slide, belt_m_s, &limits)?;
             }
             slides.push(slide);
         }

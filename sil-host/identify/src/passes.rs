@@ -84,6 +84,15 @@ impl Point {
     }
 }
 
+/// Returns the posture of an arm with this angle of the elbow, rad.
+pub(crate) fn posture(elbow_rad: f64) -> Posture {
+    if elbow_rad > 0.0 {
+        Posture::ElbowUp
+    } else {
+        Posture::ElbowDown
+    }
+}
+
 /// Where a point is.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Residual {
@@ -242,9 +251,7 @@ impl Points {
                 range.to_m = range.to_m.max(tip_t_m);
                 elbow_rad += joint_rad(parameters, 1, point.encoders_rad[1]);
             }
-            if elbow_rad > 0.0 {
-                range.posture = Posture::ElbowUp;
-            }
+            range.posture = posture(elbow_rad);
             range
         };
         (0..self.postures.len()).map(range).collect()

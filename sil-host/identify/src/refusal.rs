@@ -5,6 +5,9 @@ use painleve_shared::{OutOfRange, Posture};
 use crate::geometry::Range;
 use crate::parameters::{JOINT_NAMES, Parameter};
 
+/// Share of the readings up to which friction counts as always against the belt, %.
+const ALWAYS_AGAINST: f64 = 10.0;
+
 /// A motion that is missing.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Missing {
@@ -54,6 +57,16 @@ fn name(posture: Posture) -> &'static str {
     }
 }
 
+/// Returns which surface pushes a tip in the belt's direction in this share of the readings, %. A belt that stands still
+/// cannot be told from its frame.
+fn surface(percent: f64) -> &'static str {
+    if percent < ALWAYS_AGAINST {
+        "as if the belt ran in the other direction: let it run as told, and check the sign of f_t (converters.mounting.force_reversed)"
+    } else {
+        "as on a surface that stands still or is slower than the tip: set the tip down on the belt, not beside it, and let the belt run as told"
+    }
+}
+
 /// Reason to refuse a result.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum Refusal {
@@ -67,7 +80,7 @@ pub enum Refusal {
     },
     /// There is no tick.
     #[error(
-        "slide {}: the drive has tracked in no tick; give the record of a slide, or see what kept the drive from it",
+        "slide {}: the drive has tracked in no tick; give the record of a slide, or see what kept the drive from it, such as a tip that does not touch the belt",
         .slide + 1
     )]
     NeverTracked {
@@ -119,6 +132,18 @@ pub enum Refusal {
         percent: f64,
         /// Least normal force on the belt, N.
         contact_n: f64,
+    },
+    /// Friction does not push the tip in the direction in which the belt was to run.
+    #[error(
+        "slide {}: friction pushes the tip in the belt's direction in {percent:.0} % of the readings only, {}",
+        .slide + 1,
+        surface(*.percent)
+    )]
+    OtherFriction {
+        /// Index of the slide.
+        slide: usize,
+        /// Share of the readings with friction in which it pushes so, %.
+        percent: f64,
     },
     /// Too little motion.
     #[error("the tip slid by {slid_mm:.0} mm, less than {least_mm:.0} mm")]

@@ -2,12 +2,12 @@
 
 use painleve_shared::Posture;
 
-use crate::Limits;
 use crate::fit::{FAR, Fit, Row, Square};
-use crate::geometry::{Range, reach_m};
+use crate::geometry::{Place, Range, joint_rad, reach_m};
 use crate::parameters::{Parameter, Prior, Values};
-use crate::passes::Points;
+use crate::passes::{Points, posture};
 use crate::refusal::{Missing, Refusal};
+use crate::{Limits, Slide};
 
 /// A model explains readings that another does not if it leaves less than this part over.
 const EXPLAINS: f64 = 0.7;
@@ -30,8 +30,73 @@ pub(crate) const BELIEVED: f64 = 4.0;
 /// Least distance of the stretch to slide along from that slid along, as a part of the reach, to be told.
 const FARTHER: f64 = 0.02;
 
+/// Least friction that says in which direction a surface passes under the tip, as a part of the normal force.
+const FRICTION: f64 = 0.1;
+
+/// Least share of the readings with friction in which it has to push the tip as the belt runs.
+const PUSHED: f64 = 0.8;
+
 /// A change of both encoders' angles.
 type Change = fn([f64; 2]) -> [f64; 2];
+
+/// Other ways in which the encoders may be mounted or wired: the change that makes their angles right, and the reason.
+const OTHERS: [(Change, Refusal); 3] = [
+    (|[one, two]| [two, one], Refusal::EncodersSwapped),
+    (
+        |[one, two]| [-one, two],
+        Refusal::EncoderReversed { joint: 0 },
+    ),
+    (
+        |[one, two]| [one, -two],
+        Refusal::EncoderReversed { joint: 1 },
+    ),
+];
+
+/// Returns which other way of mounting the encoders puts the tip, where it first touches the belt, on that belt and in the
+/// posture told; `None` if the angles as they are do, or none does. For a slide that ends before it shows a line.
+pub fn misread(slide: &Slide, prior: &Prior, limits: &Limits) -> Option<Refusal> {
+    let encoders_rad = slide.on_belt(limits).next()?.encoders_rad;
+    let is_as_told = |encoders_rad: [f64; 2]| {
+        let place = Place::at(&prior.parameters, encoders_rad);
+        let deviation_m = place.depth_by.component_mul(&prior.deviations).norm();
+        place.depth_m.abs() <= BELIEVED * deviation_m
+            && posture(joint_rad(&prior.parameters, 1, encoders_rad[1])) == slide.posture
+    };
+    if is_as_told(encoders_rad) {
+        return None;
+    }
+    let mut others = OTHERS.into_iter();
+    let (_, refusal) = others.find(|(change, _)| is_as_told(change(encoders_rad)))?;
+    Some(refusal)
+}
+
+/// Checks that friction pushes the tip as a belt does that runs at this speed, m/s, faster than the tip.
+///
+/// # Errors
+/// [`Refusal::OtherFriction`] if it does not. A belt without friction passes.
+pub fn check_friction(
+    index: usize,
+    slide: &Slide,
+    belt_m_s: f64,
+    limits: &Limits,
+) -> Result<(), Refusal> {
+    let (mut pushed, mut all) = (0, 0);
+    for reading in slide.on_belt(limits) {
+        let [along_n, off_n] = reading.force_n;
+        if along_n.abs() >= FRICTION * off_n {
+            all += 1;
+            pushed += usize::from(along_n * belt_m_s > 0.0);
+        }
+    }
+    let share = pushed as f64 / all as f64;
+    if share < PUSHED {
+        return Err(Refusal::OtherFriction {
+            slide: index,
+            percent: 100.0 * share,
+        });
+    }
+    Ok(())
+}
 
 /// Checks that the arm is rigid and its tip on a line, `off_line_m` from it.
 pub(crate) fn check_line(
@@ -45,18 +110,7 @@ pub(crate) fn check_line(
     let is_off = off_line_m > most_m;
     let other = other_posture(points, fit);
     if is_off || other.is_some() {
-        let others: [(Change, Refusal); 3] = [
-            (|[one, two]| [two, one], Refusal::EncodersSwapped),
-            (
-                |[one, two]| [-one, two],
-                Refusal::EncoderReversed { joint: 0 },
-            ),
-            (
-                |[one, two]| [one, -two],
-                Refusal::EncoderReversed { joint: 1 },
-            ),
-        ];
-        for (change, refusal) in others {
+        for (change, refusal) in OTHERS {
             let changed = points.with(&prior.parameters, change);
             let fit = Fit::new(&changed, prior);
             let left_m = changed.off_line_m(&fit.parameters);

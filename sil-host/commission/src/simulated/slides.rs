@@ -1,12 +1,14 @@
 //! The slides of a simulated arm: its controller runs on the arm as it is.
 
+use nalgebra::Vector2;
 use painleve_plant::mechanics::BuiltInPlant;
+use painleve_plant::mechanics::belt::BeltProfile;
 use painleve_plant::scenario::{BeltSettings, InitialState, RunSettings, Scenario};
 use painleve_plant::simulation::Simulation;
 use painleve_plant::{Controller, Event, Plant, Probe, State, Step};
 use painleve_shared::counts::EncoderCounts;
 use painleve_shared::frame::{ActuatorFrame, SensorFrame};
-use painleve_shared::{Arm, OutOfRange, Posture};
+use painleve_shared::{Arm, LinkMotion, OutOfRange, Posture};
 use strum::{EnumString, IntoStaticStr, VariantArray};
 
 use super::SimulatedError;
@@ -24,6 +26,14 @@ pub enum GeometryMistake {
     WrongLength,
     /// The operator does not turn the elbow.
     SamePosture,
+    /// The encoders' select lines are exchanged.
+    EncodersSwapped,
+    /// The operator holds the tip beside the belt, where nothing is at its height.
+    TipInAir,
+    /// The operator sets the tip down on the frame beside the belt: it stands still, and is 4 mm lower.
+    TipOnFrame,
+    /// The operator lets the belt run in the other direction.
+    BeltReversed,
 }
 
 impl GeometryMistake {
@@ -35,6 +45,12 @@ impl GeometryMistake {
         self.into()
     }
 }
+
+/// Depth below the belt of what is beside it, as a part of what the stretched arm reaches below the belt.
+const FLOOR: f64 = 0.9;
+
+/// Height of the belt over its frame, m.
+const FRAME_M: f64 = 4e-3;
 
 /// Slip of the magnet, rad.
 const SLIP_RAD: f64 = 0.0105;
@@ -88,6 +104,11 @@ impl<P: Plant> SimulatedSlides<P> {
         match mistake {
             Some(GeometryMistake::BentLink) => *length_2 *= 0.94,
             Some(GeometryMistake::WrongLength) => *length_1 *= 1.05,
+            Some(GeometryMistake::TipInAir) => {
+                let stretched_m = *length_1 + *length_2;
+                actual.arm.height_m += FLOOR * (stretched_m - actual.arm.height_m);
+            }
+            Some(GeometryMistake::TipOnFrame) => actual.arm.height_m += FRAME_M,
             _ => {}
         }
         Self {
@@ -109,7 +130,31 @@ impl<P: Plant> SimulatedSlides<P> {
             let EncoderCounts(counts) = &mut frame.joints[1];
             *counts = counts.wrapping_add(slipped) & (scale.modulus() - 1);
         }
+        if self.mistake == Some(GeometryMistake::EncodersSwapped) {
+            frame.joints.swap(0, 1);
+        }
         frame
+    }
+
+    /// Returns the angles of the links with the tip where the operator sets it down, below joint 1, rad.
+    fn start_rad(&self, posture: Posture) -> Result<LinkMotion<f64>, OutOfRange> {
+        let arm = Arm::new(self.actual.arm)?;
+        let height_m = match (self.mistake, &self.actual.arm_model) {
+            (Some(GeometryMistake::TipInAir), Some(told)) => f64::from(told.height_m),
+            _ => arm.height_m(),
+        };
+        let start = arm.link_angles_rad(&Vector2::new(0.0, -height_m), posture);
+        Ok(start.unwrap_or_default())
+    }
+
+    /// Returns how the surface under the tip moves.
+    fn profile(&self, told: &BeltProfile) -> BeltProfile {
+        let constant = |speed_m_s| BeltProfile::Constant { speed_m_s };
+        match self.mistake {
+            Some(GeometryMistake::TipOnFrame) => constant(0.0),
+            Some(GeometryMistake::BeltReversed) => constant(-told.speed_m_s(0.0)),
+            _ => told.clone(),
+        }
     }
 }
 
@@ -122,17 +167,13 @@ impl<P: Plant> SlideRig for SimulatedSlides<P> {
             Some(GeometryMistake::SamePosture) => Posture::ElbowDown,
             _ => posture,
         };
-        let arm = Arm::new(self.actual.arm)?;
-        let start = arm
-            .link_angles_on_belt_rad(0.0, posture)
-            .unwrap_or_default();
-        let [theta_1, theta_2] = start.to_array().map(f64::to_degrees);
+        let [theta_1, theta_2] = self.start_rad(posture)?.to_array().map(f64::to_degrees);
         let slid = Scenario {
             initial: InitialState::at_rest(theta_1, theta_2),
             controller: scenario.controller.clone(),
             arm_model: scenario.arm_model.or(self.actual.arm_model),
             belt: BeltSettings {
-                profile: scenario.belt.profile.clone(),
+                profile: self.profile(&scenario.belt.profile),
                 ..self.actual.belt
             },
             run: RunSettings {

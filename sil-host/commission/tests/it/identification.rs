@@ -556,6 +556,10 @@ fn mistakes_are_refused_with_their_reason() {
             GeometryMistake::SlippingMagnet => "encoder of the elbow: slipped",
             GeometryMistake::BentLink | GeometryMistake::WrongLength => "is known beforehand",
             GeometryMistake::SamePosture => "not as told",
+            GeometryMistake::EncodersSwapped => "encoders: exchanged",
+            GeometryMistake::TipInAir => "does not touch the belt",
+            GeometryMistake::TipOnFrame => "as on a surface that stands still",
+            GeometryMistake::BeltReversed => "as if the belt ran in the other direction",
         };
         let (found, _) = identified(&Scenario::default(), 7_002_000, Some(*mistake));
         let refusal = found.map(|_| ()).unwrap_err();

@@ -1,5 +1,6 @@
 //! Wrong models are refused, each with its reason.
 
+use painleve_identify::verdict::{check_friction, misread};
 use painleve_identify::{Parameter, Refusal, Slide, identify};
 use painleve_shared::Posture;
 
@@ -37,6 +38,67 @@ fn exchanged_encoders_are_named() {
         |refusal| *refusal == Refusal::EncodersSwapped,
     );
     assert!(missed.is_empty(), "{missed:#?}");
+}
+
+/// The tip presses too hard before it has slid: only where it touches the belt is known.
+#[test]
+fn encoders_are_named_by_where_the_tip_is_set_down() {
+    type Change = fn(&mut [f64; 2]);
+    let changes: [(Change, Option<Refusal>); 4] = [
+        (|_| {}, None),
+        (|both| both.swap(0, 1), Some(Refusal::EncodersSwapped)),
+        (
+            |[one, _]| *one = -*one,
+            Some(Refusal::EncoderReversed { joint: 0 }),
+        ),
+        (
+            |[_, two]| *two = -*two,
+            Some(Refusal::EncoderReversed { joint: 1 }),
+        ),
+    ];
+    for seed in SEEDS {
+        for posture in [Posture::ElbowDown, Posture::ElbowUp] {
+            for (change, expected) in &changes {
+                let mut rig = Rig::new(seed);
+                let mut reading = rig.reading(posture, 0.02, 0.0);
+                change(&mut reading.encoders_rad);
+                let slide = Slide {
+                    posture,
+                    readings: vec![reading],
+                    missing: 0,
+                    whole: 9000,
+                };
+                assert_eq!(misread(&slide, &rig.prior, &limits()), *expected, "{seed}");
+            }
+        }
+    }
+}
+
+#[test]
+fn friction_tells_the_running_belt_from_its_frame_and_from_the_other_direction() {
+    let of = |friction: f64, belt_m_s: f64, turns_over: bool| {
+        let mut slide = Rig::new(35_000).slide(Posture::ElbowDown, -0.9, 0.9);
+        let half = slide.readings.len() / 2;
+        for (index, reading) in slide.readings.iter_mut().enumerate() {
+            let sign = if turns_over && index < half {
+                -1.0
+            } else {
+                1.0
+            };
+            reading.force_n[0] = sign * friction * reading.force_n[1];
+        }
+        check_friction(3, &slide, belt_m_s, &limits()).map_err(|refusal| refusal.to_string())
+    };
+    for sign in [1.0, -1.0] {
+        assert_eq!(of(0.6 * sign, 0.15 * sign, false), Ok(()));
+        let stands = of(0.6 * sign, 0.15 * sign, true).unwrap_err();
+        assert!(stands.starts_with("slide 4: ") && stands.contains(" 50 % "));
+        assert!(stands.contains("stands still"), "{stands}");
+        let reversed = of(0.6 * sign, -0.15 * sign, false).unwrap_err();
+        assert!(reversed.contains("in the other direction"), "{reversed}");
+        // Too little to tell.
+        assert_eq!(of(0.05 * sign, -0.15 * sign, false), Ok(()));
+    }
 }
 
 fn is_named_if_slipping(joint: usize) {
