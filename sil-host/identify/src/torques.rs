@@ -49,6 +49,9 @@ const TILT_RAD: f64 = 0.04;
 /// Part of a result that is always assumed to be wrong: at the low speed of a slide, friction is a little more than Coulomb's.
 const ALWAYS: f64 = 0.02;
 
+/// Part of the torques by which an offset is always assumed to be wrong: slides hardly tell it from the belt's tilt.
+const ALWAYS_OFFSET: f64 = 0.005;
+
 /// Change of the tilt for its derivative, rad.
 const TILTED_RAD: f64 = 1e-4;
 
@@ -85,12 +88,27 @@ pub struct Joint {
     pub stiffness_nm_rad: Estimate,
     /// Torque of the stage relative to the commanded one.
     pub gain: Estimate,
+    /// Constant torque that the model does not have, in commanded torque, N·m: of a spring that rests at another angle, or of
+    /// a stage that gives a torque when none is commanded.
+    pub offset_nm: Estimate,
 }
 
 impl Joint {
     /// Returns whether its friction would drive it.
     pub fn drives_itself(&self) -> bool {
         self.friction_nm.value < -BELIEVED * self.friction_nm.deviation
+    }
+
+    /// Returns whether it takes a constant torque that the model does not have.
+    pub fn has_offset(&self) -> bool {
+        self.offset_nm.value.abs() > BELIEVED * self.offset_nm.deviation
+    }
+
+    /// Returns by how much its spring would rest at a larger angle if that explains the offset, rad; `None` without a spring.
+    pub fn rest_error_rad(&self) -> Option<f64> {
+        let stiffness = self.stiffness_nm_rad;
+        (stiffness.value > BELIEVED * stiffness.deviation)
+            .then(|| -self.offset_nm.value / stiffness.value)
     }
 
     /// Returns whether its stage gives another torque than any healthy one.
@@ -192,10 +210,19 @@ impl Joints {
             let stiffness = solution.sum(&(unit(SPRING) + unit(STAGE) * nominal));
             let commanded = solution.sum(&unit(STAGE));
             let gain = 1.0 / (1.0 + commanded.value);
+            let offset = solution.sum(&unit(OFFSET));
             Joint {
                 friction_nm: assured(friction.value, friction.deviation),
                 stiffness_nm_rad: assured(nominal + stiffness.value, stiffness.deviation),
                 gain: assured(gain, commanded.deviation * gain * gain),
+                offset_nm: Estimate {
+                    deviation: libm::hypot(
+                        assured(offset.value, offset.deviation).deviation,
+                        // What is known of an offset beforehand is the size of the torques.
+                        ALWAYS_OFFSET * deviations[OF_JOINT * joint + OFFSET],
+                    ),
+                    ..offset
+                },
             }
         };
         let mut before = Values::zeros();

@@ -77,6 +77,7 @@ pub fn json(found: &Found) -> Value {
             "coulomb_friction_nm": of(joint.friction_nm),
             "stiffness_nm_rad": of(joint.stiffness_nm_rad),
             "stage_gain": of(joint.gain),
+            "offset_nm": of(joint.offset_nm),
         })
     };
     json!({
@@ -134,6 +135,16 @@ fn sentences(found: &Found) -> Vec<String> {
                 "The friction of {name} comes out below zero, which no joint has: check the arm's masses and springs, and the force cell."
             ));
         }
+        if joint.has_offset() {
+            let as_of = joint.rest_error_rad().map_or(String::new(), |rad| {
+                let farther = format!("{rad:+.3}").replace('-', "−");
+                format!(", as if its spring rested {farther} rad from spring_rest_rad in arm_model")
+            });
+            sentences.push(format!(
+                "The torque of {name} has a constant part of {} mN·m that the model lacks{as_of}: check the spring, and the stage's torque at a command of zero.",
+                spread(1e3 * joint.offset_nm.value, 1e3 * joint.offset_nm.deviation, 0)
+            ));
+        }
         if joint.has_another_gain() {
             sentences.push(format!(
                 "The torque stage of {name} seems to give {:.2} times the commanded torque: check converters.stages.",
@@ -167,10 +178,10 @@ fn geometry(found: &Found) -> Table {
     }
 }
 
-/// Returns what the torques show. No setting takes the gain of a stage: it is for information.
+/// Returns what the torques show. No setting takes the gain of a stage or a constant torque: they are for information.
 fn joints(found: &Found) -> Table {
     type Of = fn(&Joint) -> Estimate;
-    let rows: [(&str, Of, f64, usize, &str); 3] = [
+    let rows: [(&str, Of, f64, usize, &str); 4] = [
         ("friction", |it| it.friction_nm, 1e3, 0, "mN·m"),
         (
             "stiffness of the spring",
@@ -180,6 +191,7 @@ fn joints(found: &Found) -> Table {
             "N·m/rad",
         ),
         ("torque to commanded torque", |it| it.gain, 1.0, 2, ""),
+        ("constant torque", |it| it.offset_nm, 1e3, 0, "mN·m"),
     ];
     let rows = rows.map(|(name, of, scale, digits, unit)| {
         let [one, two] = found.joints.joints.map(|joint| {

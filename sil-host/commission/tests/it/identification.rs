@@ -144,6 +144,10 @@ fn arms_as_bad_as_life_are_identified() {
         assert!(rig.largest_force_n < 8.0, "{}", rig.largest_force_n);
         let actual = imperfect(&scenario, seed).unwrap();
         for (name, truth, found) in assert_joints_found(&actual, &joints) {
+            if name.starts_with("offset") {
+                assert!(found.deviation < 0.01, "{name}: {found:?}");
+                continue;
+            }
             assert!(found.deviation < 0.1 * truth, "{name}: {truth}, {found:?}");
         }
         let [before_nm, after_nm] = joints.left_over_nm.unwrap();
@@ -384,6 +388,20 @@ fn encoders_on_motors_are_read_without_the_twist_of_the_gears() {
     assert_eq!(soft[1].encoders_rad, rigid[2].encoders_rad);
 }
 
+#[test]
+fn a_spring_that_rests_elsewhere_is_told_from_one_that_is_stiffer() {
+    let scenario = Scenario::default();
+    let mut actual = imperfect(&scenario, 51_001).unwrap();
+    actual.arm.spring_rest_rad[1] += 0.05;
+    let mut rig = SimulatedSlides::new(actual.clone(), None);
+    let found = identify_arm(&mut rig, &scenario, &drawn()).unwrap();
+    assert_joints_found(&actual, &found.joints);
+    let [first, elbow] = found.joints.joints;
+    assert!(!first.has_offset() && elbow.has_offset(), "{found:?}");
+    let farther_rad = elbow.rest_error_rad().unwrap();
+    assert!((farther_rad - 0.05).abs() < 0.01, "{farther_rad}");
+}
+
 /// Joints that turn to and fro show less friction than they have.
 #[test]
 fn joints_that_vibrate_do_not_pass_for_joints_with_less_friction() {
@@ -541,6 +559,10 @@ fn joint_truths(actual: &Scenario, found: &Joints) -> Vec<(String, f64, Estimate
         let friction_nm = commanded * actual.effects.joints.coulomb_nm;
         truths.push((format!("friction {index}"), friction_nm, joint.friction_nm));
         let stiffness_nm_rad = commanded * actual.arm.stiffness_nm_rad[index];
+        let told_rad = actual.arm_model.unwrap().spring_rest_rad[index];
+        let farther_rad = actual.arm.spring_rest_rad[index] - f64::from(told_rad);
+        let offset_nm = -stiffness_nm_rad * farther_rad;
+        truths.push((format!("offset {index}"), offset_nm, joint.offset_nm));
         if stiffness_nm_rad > 0.0 {
             let name = format!("stiffness {index}");
             truths.push((name, stiffness_nm_rad, joint.stiffness_nm_rad));
