@@ -7,22 +7,25 @@ pub enum Turn {
     /// The torques that the model does not explain, and the links' length.
     #[default]
     Balance,
-    /// The response of the contact, if a block of its readings is complete; otherwise the edges.
+    /// The edges of the admissible stretch.
     Edges,
+    /// The response of the contact.
+    Response,
 }
 
 impl Turn {
     /// Updates from one turn to the next of the same work.
-    pub const COUNT: f32 = 2.0;
+    pub const COUNT: f32 = 3.0;
 
-    /// Takes this turn; the other one is next.
+    /// Takes this turn; another one is next.
     #[inline]
     pub fn take(&mut self) -> Self {
-        let other = match self {
+        let next = match self {
             Self::Balance => Self::Edges,
-            Self::Edges => Self::Balance,
+            Self::Edges => Self::Response,
+            Self::Response => Self::Balance,
         };
-        core::mem::replace(self, other)
+        core::mem::replace(self, next)
     }
 }
 

@@ -163,16 +163,15 @@ impl<L: Law> Stages<L> {
     pub fn learn(&mut self) {
         let turn = self.turn.take();
         let (estimates, observed) = (&mut self.estimates, &self.observed);
-        if estimates.contact.touches {
-            if estimates.learn_in_contact(observed, turn) {
-                self.references.search(estimates);
-            }
+        let touches = estimates.contact.touches;
+        if touches {
+            estimates.learn_in_contact(observed, turn);
         } else {
             estimates.learn_in_the_air(observed, turn);
-            // A tip that is being returned to the belt needs the edges soon.
-            if turn == Turn::Edges || self.references.asks_for_landing() {
-                self.references.search(estimates);
-            }
+        }
+        // A tip that is being returned to the belt needs the edges soon.
+        if turn == Turn::Edges || (!touches && self.references.asks_for_landing()) {
+            self.references.search(estimates);
         }
     }
 

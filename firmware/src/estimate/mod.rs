@@ -174,10 +174,9 @@ impl Estimators {
         force_n.x.abs() < range_n && force_n.y.abs() < range_n
     }
 
-    /// Updates friction, belt and response of a contact with the force at the last tick, and what has this turn. Returns
-    /// whether the turn of the edges is free for them.
+    /// Updates friction, belt and response of a contact with the force at the last tick, and what has this turn.
     #[inline]
-    pub fn learn_in_contact(&mut self, observed: &Observed, turn: Turn) -> bool {
+    pub fn learn_in_contact(&mut self, observed: &Observed, turn: Turn) {
         let is_informative = self.add_to_balance(observed);
         let is_in_range = self.is_in_range();
         let (model, contact) = (&self.model, &mut self.contact);
@@ -192,32 +191,25 @@ impl Estimators {
         );
         let p_per_kg = contact.p_per_kg;
         let slides = p_per_kg > 0.0 && !friction.sticks;
-        let mut completes_block = false;
         if is_informative && slides && !observed.saturated && self.response.is_enabled() {
             let slope = &model.free_slope_per_kg_m;
             let withheld_n = observed.rounding_nm.vector().dot(slope) / p_per_kg;
-            completes_block =
-                self.response
-                    .update(contact.force_n.y, withheld_n, observed.elapsed_ticks);
+            self.response
+                .update(contact.force_n.y, withheld_n, observed.elapsed_ticks);
+            if turn == Turn::Response {
+                self.response.evaluate();
+            }
         } else {
             self.response.pause();
         }
-        match turn {
-            Turn::Balance => {
-                self.balance_torques();
-                // The gap of a tip that certainly touches shows the links' length. An unchanged reading would gain weight
-                // merely with time.
-                if observed.drove && self.detector.is_certain() && self.joints.moved {
-                    let gap_m = self.gap_m();
-                    self.calibrator.update(&mut self.arm, gap_m);
-                }
-                false
+        if turn == Turn::Balance {
+            self.balance_torques();
+            // The gap of a tip that certainly touches shows the links' length. An unchanged reading would gain weight
+            // merely with time.
+            if observed.drove && self.detector.is_certain() && self.joints.moved {
+                let gap_m = self.gap_m();
+                self.calibrator.update(&mut self.arm, gap_m);
             }
-            Turn::Edges if completes_block => {
-                self.response.evaluate();
-                false
-            }
-            Turn::Edges => true,
         }
     }
 

@@ -41,13 +41,8 @@ const RIGID: f32 = 0.5;
 const EACH_LOOP: f32 = 1.0 / 3.0;
 /// Number of delays between torque and force that are considered, in ticks. With two the torque was noisier (the same).
 const DELAYS: usize = 3;
-/// Ticks of one block of sums. After a block, averages and bounds are updated in the next two ticks with
-/// spare time, so that no tick does all of it.
-const BLOCK_TICKS: u8 = 15;
-/// Value of the counter of ticks at which a block is evaluated.
-const END_TICKS: u8 = BLOCK_TICKS + 2;
-/// Ticks from one block to the next, if every other tick has spare time.
-const PERIOD_TICKS: u8 = BLOCK_TICKS + 3;
+/// Readings before which the bounds are not evaluated: fewer may agree by chance.
+const LEAST_READINGS: f32 = 15.0;
 /// The law damps a contact if the upper bound of its response is below this part of [`RIGID`]. With more the torque was noisier (the same).
 const DAMPED: f32 = 0.4;
 /// Time in contact before the correlation starts: a contact that lasts longer is not a bounce, s.
@@ -84,8 +79,8 @@ impl ContactResponse {
 pub struct ResponseEstimator {
     settings: ResponseSettings,
     tick_s: f32,
-    /// Weight of one block in the averages.
-    weight: f32,
+    /// Readings over which the averages are taken.
+    most_readings: f32,
     /// Share for each unit of p that is always allowed, kg.
     least_share_kg: f32,
     /// Last normal force and its last change, N.
@@ -101,13 +96,11 @@ pub struct ResponseEstimator {
     random: u16,
     /// Expected changes of force, N, the latest first.
     expected_n: [f32; DELAYS + 1],
-    /// Sums over the present block, of first and of second differences.
-    block: [Moments; 2],
-    block_ticks: u8,
-    /// Averages of the blocks.
+    /// Averages of first and of second differences.
     averages: [Moments; 2],
-    blocks: f32,
-    /// Sum of the squares of the blocks' weights in the averages.
+    /// Readings in them, at most those of the averaging time.
+    readings: f32,
+    /// Sum of the squares of the readings' weights in the averages.
     spread: f32,
     /// Distance of the bounds of ρ from first differences.
     width: f32,
@@ -121,7 +114,7 @@ pub struct ResponseEstimator {
     touched_s: f32,
 }
 
-/// Sums or averages over blocks of ticks, N², of first or of second differences of the force.
+/// Averages, N², of first or of second differences of the force.
 #[derive(Clone, Copy, Debug, Default)]
 struct Moments {
     /// Measured times expected difference, for each delay.
@@ -140,28 +133,18 @@ struct Uncertain {
 }
 
 impl Moments {
-    /// Adds a measured difference, N, and the ones expected at each delay.
+    /// Moves the averages by `weight` towards a measured difference, N, and the ones expected at each delay.
     #[inline]
-    fn add(&mut self, measured_n: f32, expected_n: [f32; DELAYS]) {
+    fn add(&mut self, measured_n: f32, expected_n: [f32; DELAYS], weight: f32) {
         for (product, expected_n) in self.products.iter_mut().zip(expected_n) {
-            *product += measured_n * expected_n;
+            *product += weight * (measured_n * expected_n - *product);
         }
         let [_, expected_n, _] = expected_n;
-        self.expected += expected_n * expected_n;
-        self.measured += measured_n * measured_n;
+        self.expected += weight * (expected_n * expected_n - self.expected);
+        self.measured += weight * (measured_n * measured_n - self.measured);
     }
 
-    /// Moves the averages by `weight` towards the sums of a block.
-    #[inline(never)]
-    fn approach(&mut self, sums: &Self, weight: f32) {
-        for (average, sum) in self.products.iter_mut().zip(sums.products) {
-            *average += weight * (sum - *average);
-        }
-        self.expected += weight * (sums.expected - self.expected);
-        self.measured += weight * (sums.measured - self.measured);
-    }
-
-    /// Returns ρ from averages of blocks whose squared weights have this sum.
+    /// Returns ρ from averages of readings whose squared weights have this sum.
     #[inline(never)]
     fn response(&self, spread: f32) -> Uncertain {
         let largest = |most: f32, product: &f32| product.at_least(most);
@@ -169,7 +152,7 @@ impl Moments {
         // Not zero where nothing was expected: the response is then unknown.
         let square = self.expected.at_least(1e-12);
         let variance = spread * self.measured * square;
-        let deviation = (variance / f32::from(BLOCK_TICKS)).square_root() / square;
+        let deviation = variance.square_root() / square;
         Uncertain {
             response: most / square,
             deviation,
@@ -180,11 +163,10 @@ impl Moments {
 impl ResponseEstimator {
     /// Makes an estimator that is called every `tick_s`.
     pub fn new(settings: &ResponseSettings, tick_s: f32) -> Self {
-        let period_s = f32::from(PERIOD_TICKS) * tick_s;
         Self {
             settings: *settings,
             tick_s,
-            weight: period_s / AVERAGING_S,
+            most_readings: AVERAGING_S / tick_s,
             least_share_kg: settings.least_damping_ns_m * tick_s,
             force_n: 0.0,
             change_n: 0.0,
@@ -194,10 +176,8 @@ impl ResponseEstimator {
             probe_n: 0.0,
             random: 1,
             expected_n: [0.0; DELAYS + 1],
-            block: Default::default(),
-            block_ticks: 0,
             averages: Default::default(),
-            blocks: 0.0,
+            readings: 0.0,
             spread: 1.0,
             width: 1.0,
             gain: if settings.enabled { 0.0 } else { 1.0 },
@@ -230,12 +210,11 @@ impl ResponseEstimator {
         }
     }
 
-    /// Adds one tick of a tip that slides in contact to the present block, and returns whether the block is
-    /// complete: [`evaluate`](Self::evaluate) is then due, twice, when there is time. `normal_force_n` is the measured
-    /// force (N), `withheld_n` the one that the torque withheld by rounding would cause on a rigid contact (N), and
-    /// `elapsed_ticks` the time since the previous readings.
+    /// Adds one tick of a tip that slides in contact to the averages. `normal_force_n` is the measured force (N),
+    /// `withheld_n` the one that the torque withheld by rounding would cause on a rigid contact (N), and `elapsed_ticks`
+    /// the time since the previous readings.
     #[inline]
-    pub fn update(&mut self, normal_force_n: f32, withheld_n: f32, elapsed_ticks: u32) -> bool {
+    pub fn update(&mut self, normal_force_n: f32, withheld_n: f32, elapsed_ticks: u32) {
         if elapsed_ticks > 1 {
             // Forces before lost readings show nothing: skip the ticks with differences to them.
             let skipped_s = (DELAYS as f32 + 1.5) * self.tick_s;
@@ -256,51 +235,28 @@ impl ResponseEstimator {
         self.acting_probe_n = self.probe_n;
         self.probe_n = 0.0;
         if self.touched_s < SETTLING_S {
-            return false;
+            return;
         }
         if self.gain < 1.0 {
             // As much as there is to find out.
             self.draw_probe(self.width.at_most(1.0) * self.settings.probe_n);
         }
-        if self.block_ticks < BLOCK_TICKS {
-            self.block_ticks += 1;
-            let [first, second] = &mut self.block;
-            first.add(change_n, [e0, e1, e2]);
-            second.add(change_of_change_n, [e0 - e1, e1 - e2, e2 - e3]);
-            return false;
-        }
-        true
-    }
-
-    /// Updates the averages or the bounds with a complete block.
-    #[inline]
-    pub fn evaluate(&mut self) {
-        self.block_ticks += 1;
-        if self.block_ticks < END_TICKS {
-            self.average();
-        } else {
-            self.bound();
-        }
-    }
-
-    /// Adds a block to the averages.
-    #[inline(never)]
-    fn average(&mut self) {
-        let sums = core::mem::take(&mut self.block);
-        self.blocks += 1.0;
-        // The plain mean of the first blocks, until it covers the averaging time.
-        let weight = (1.0 / self.blocks).at_least(self.weight).at_most(1.0);
+        // A plain mean until it covers the averaging time.
+        self.readings = (self.readings + 1.0).at_most(self.most_readings);
+        let weight = 1.0 / self.readings;
         let rest = 1.0 - weight;
         self.spread = rest * rest * self.spread + weight * weight;
-        for (averages, sums) in self.averages.iter_mut().zip(&sums) {
-            averages.approach(sums, weight);
-        }
+        let [first, second] = &mut self.averages;
+        first.add(change_n, [e0, e1, e2], weight);
+        second.add(change_of_change_n, [e0 - e1, e1 - e2, e2 - e3], weight);
     }
 
     /// Updates the bounds of ρ from the averages.
     #[inline(never)]
-    fn bound(&mut self) {
-        self.block_ticks = 0;
+    pub fn evaluate(&mut self) {
+        if self.readings < LEAST_READINGS {
+            return;
+        }
         let [first, second] = &self.averages;
         let Uncertain {
             response,
@@ -327,8 +283,6 @@ impl ResponseEstimator {
             self.probe_n = 0.0;
             // What the contact is stays known; the law's damping begins anew from the force after the pause.
             self.give = 0.0;
-            self.block = Default::default();
-            self.block_ticks = 0;
         }
     }
 
