@@ -49,7 +49,8 @@ impl TorqueOutput {
         let given = counts.map(|counts| self.converter.value(counts));
         command.counts = counts.map(TorqueCounts);
         command.torque_nm = JointTorque::from_array(given);
-        command.saturated = counts != nearest;
+        // A torque at the limit is not short of the desired one because it has been rounded.
+        command.saturated = (wanted_nm - command.torque_nm).amax() > self.converter.per_count;
         // What the limit withholds is not owed.
         let withheld = (owed - command.torque_nm).to_array();
         let rounding = [0, 1].map(|joint| {

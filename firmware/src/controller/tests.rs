@@ -285,7 +285,9 @@ fn the_tip_is_pressed_less_where_torque_is_short() {
     assert_ne!(answer.torques, [TorqueCounts(0); 2]);
     assert_eq!(telemetry.saturated_ticks, 0);
     let largest_nm = telemetry.torque_nm.amax();
-    assert!(largest_nm <= 0.95 * 1.5 + 1e-3, "{largest_nm}");
+    // All of the torque is used, to the last count.
+    let count_nm = configuration().converters.torque.converter().per_count;
+    assert!((1.5 - largest_nm).abs() <= 1.01 * count_nm, "{largest_nm}");
 }
 
 #[test]

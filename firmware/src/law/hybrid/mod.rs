@@ -14,11 +14,13 @@
 //! and low-passes only the difference to the measured f_t, with a gain that falls with p (see
 //! [`FrictionFeedForward::Observed`]).
 
+mod allocation;
 mod settings;
 
 use nalgebra::Vector2;
-use painleve_shared::{JointTorque, Real, Slip};
+use painleve_shared::{Real, Slip};
 
+use self::allocation::Allocation;
 pub use self::settings::{FrictionFeedForward, HybridSettings};
 use super::{Law, LawInput, LawOutput};
 
@@ -34,43 +36,6 @@ const DAMPING_RAD_S: f32 = 1000.0;
 /// Slowing of the rate at which the law learns the acceleration by other contact forces, for each unit of p, kg.
 const SLOWER_KG: f32 = 1.0;
 
-/// Fraction of the torque limit available for pressing the tip on the belt; the rest is for motion.
-const TORQUE_USED: f32 = 0.95;
-
-/// Returns the fraction of `pressing_nm`, at least `least`, that keeps both joints within ±`limit_nm` together with
-/// `motion_nm`.
-#[inline]
-fn affordable(
-    motion_nm: &JointTorque<f32>,
-    pressing_nm: &JointTorque<f32>,
-    limit_nm: f32,
-    least: f32,
-) -> f32 {
-    if (*motion_nm + *pressing_nm).amax() <= limit_nm {
-        1.0
-    } else {
-        affordable_part(motion_nm, pressing_nm, limit_nm).at_least(least)
-    }
-}
-
-/// Returns the largest such fraction, up to 1, without a least one.
-#[cold]
-#[inline(never)]
-fn affordable_part(
-    motion_nm: &JointTorque<f32>,
-    pressing_nm: &JointTorque<f32>,
-    limit_nm: f32,
-) -> f32 {
-    // Not finite without a pressing torque: less of none leaves no more for the motion.
-    let of_joint = |motion: f32, pressing: f32| {
-        let per_nm = 1.0 / pressing;
-        limit_nm * per_nm.abs() - motion * per_nm
-    };
-    1.0_f32
-        .at_most(of_joint(motion_nm.first(), pressing_nm.first()))
-        .at_most(of_joint(motion_nm.second(), pressing_nm.second()))
-}
-
 /// The hybrid law's state.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct HybridState {
@@ -84,6 +49,8 @@ pub struct HybridState {
     slip: Option<Slip>,
     /// Present fraction of the desired contact force: at most that for which torque is available.
     pressing: f32,
+    /// Whether the torque did not suffice for the motion.
+    slows: bool,
     /// Low-passed normal force, N.
     slow_force_n: f32,
     /// Contact force (f_t, f_n) fed forward at the last tick, N.
@@ -132,16 +99,22 @@ impl Law for HybridSettings {
         let wanted = Vector2::new(friction_force, normal_force);
         let motion_nm = input.model.inverse_dynamics_in_air_nm(&acceleration);
         let pressing_nm = input.model.torque_against_nm(&wanted);
-        let share = affordable(
-            &motion_nm,
+        let Allocation {
+            motion_nm,
+            pressing,
+            slows,
+        } = Allocation::new(
+            input.model,
+            motion_nm,
             &pressing_nm,
-            TORQUE_USED * input.torque_limit_nm,
+            input.torque_limit_nm,
             self.least_pressing,
         );
+        state.slows = slows;
         // A force that rose at once would make a contact with little damping ring: after landing, and where it
         // followed the torque that the motion leaves.
         let rise = self.pressing_rate_per_s * input.tick_s;
-        state.pressing = share.at_most((state.pressing + rise * share) / (1.0 + rise));
+        state.pressing = pressing.at_most((state.pressing + rise * pressing) / (1.0 + rise));
         state.fed_force_n = wanted * state.pressing;
         LawOutput {
             torque_nm: motion_nm + pressing_nm * state.pressing,
@@ -156,7 +129,7 @@ impl HybridSettings {
         let error = input.reference.position_m - input.model.tip_m.x;
         let error_rate = input.reference.velocity_m_s - input.model.tip_velocity_m_s.x;
         // Held in the air and while the torque is limited, it needs no limit of its own.
-        if input.contact.touches && !input.saturated {
+        if input.contact.touches && !input.saturated && !state.slows {
             state.position_integral_m_s2 +=
                 self.position_integral_gain_per_s3 * error * input.tick_s;
         }

@@ -106,6 +106,8 @@ struct Sliding {
     contact: ContactEstimate,
     saturated: bool,
     torque_limit_nm: f32,
+    /// Distance from the tip to its reference, m.
+    ahead_m: f32,
 }
 
 impl Sliding {
@@ -124,6 +126,7 @@ impl Sliding {
             contact,
             saturated: false,
             torque_limit_nm: 50.0,
+            ahead_m: 0.0,
         };
         sliding.with(HybridSettings::reset);
         sliding
@@ -140,7 +143,7 @@ impl Sliding {
             posture: Posture::ElbowDown,
             contact: &self.contact,
             saturated: self.saturated,
-            reference: TipReference::at_rest(self.model.tip_m.x),
+            reference: TipReference::at_rest(self.model.tip_m.x + self.ahead_m),
             torque_limit_nm: self.torque_limit_nm,
             tick_s: 1e-3,
         };
@@ -238,12 +241,17 @@ fn the_force_integral_removes_the_error_up_to_its_limit() {
 }
 
 #[test]
-fn pressing_gets_the_torque_that_the_motion_leaves() {
-    let pressing_nm = JointTorque::new(1.0, -1.0);
-    for (motion_nm, share) in [(1.0, 1.0), (1.9, 0.1), (3.0, 0.0)] {
-        let motion_nm = JointTorque::new(motion_nm, 0.0);
-        let found = affordable(&motion_nm, &pressing_nm, 2.0, 0.0);
-        assert!((found - share).abs() < 1e-6, "{found} {share}");
-        assert_eq!(affordable(&motion_nm, &pressing_nm, 2.0, 1.0), 1.0);
-    }
+fn the_position_integral_waits_while_the_motion_is_slower_than_desired() {
+    let mut tip = Sliding::new();
+    tip.ahead_m = 0.05;
+    tip.torque_limit_nm = 1.0;
+    tip.tick();
+    assert!(tip.state.slows, "{:?}", tip.state);
+    let waiting = tip.state.position_integral_m_s2;
+    tip.tick();
+    assert_eq!(tip.state.position_integral_m_s2, waiting);
+    tip.torque_limit_nm = 50.0;
+    tip.tick();
+    tip.tick();
+    assert!(tip.state.position_integral_m_s2 > waiting);
 }

@@ -1,0 +1,155 @@
+//! Allocates the torque, in the order of importance: the least normal force, the motion along the belt, the rest of the
+//! normal force.
+
+use nalgebra::Vector2;
+use painleve_shared::{JointTorque, Real};
+
+use crate::estimate::model::Model;
+
+/// Torques of the motion and part of the normal force that the torque limits allow.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Allocation {
+    /// Joint torques of the motion along the belt, N·m.
+    pub motion_nm: JointTorque<f32>,
+    /// Part of the desired contact force, at least the least one.
+    pub pressing: f32,
+    /// Whether the motion is slower than desired.
+    pub slows: bool,
+}
+
+impl Allocation {
+    /// Allocates up to ±`limit_nm` of each joint to a motion with these joint torques and to the torques that press the tip
+    /// on the belt, of which the part `least` comes first. With `least` = 1, as in the paper, all is left to the output.
+    #[inline]
+    pub fn new(
+        model: &Model,
+        motion_nm: JointTorque<f32>,
+        pressing_nm: &JointTorque<f32>,
+        limit_nm: f32,
+        least: f32,
+    ) -> Self {
+        if (motion_nm + *pressing_nm).amax() <= limit_nm || least >= 1.0 {
+            return Self {
+                motion_nm,
+                pressing: 1.0,
+                slows: false,
+            };
+        }
+        Self::limited(model, motion_nm, pressing_nm, limit_nm, least)
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn limited(
+        model: &Model,
+        motion_nm: JointTorque<f32>,
+        pressing_nm: &JointTorque<f32>,
+        limit_nm: f32,
+        least: f32,
+    ) -> Self {
+        let [lowest, highest] = affordable(&motion_nm, pressing_nm, limit_nm);
+        if highest >= lowest && highest >= least {
+            return Self {
+                motion_nm,
+                pressing: highest,
+                slows: false,
+            };
+        }
+        let steady = model.link_acceleration_rad_s2(&Vector2::zeros());
+        let steady_nm = model.inverse_dynamics_in_air_nm(&steady);
+        let before_nm = steady_nm + *pressing_nm * least;
+        let change_nm = motion_nm - steady_nm;
+        let [_, highest] = affordable(&before_nm, &change_nm, limit_nm);
+        Self {
+            motion_nm: steady_nm + change_nm * highest.at_least(0.0),
+            pressing: least,
+            slows: true,
+        }
+    }
+}
+
+/// Returns the lowest and the highest part, up to 1, of these torques that keeps both joints within ±`limit_nm` together
+/// with those that come `before`; no part does if the lowest is above the highest.
+fn affordable(
+    before_nm: &JointTorque<f32>,
+    torque_nm: &JointTorque<f32>,
+    limit_nm: f32,
+) -> [f32; 2] {
+    let of_joint = |before: f32, torque: f32| {
+        // No torque is taken for very little, of which any part fits or none.
+        let per_nm = 1.0 / torque.abs().at_least(1e-6).copysign(torque);
+        let (middle, half) = (-before * per_nm, limit_nm * per_nm.abs());
+        [middle - half, middle + half]
+    };
+    let [lowest_1, highest_1] = of_joint(before_nm.first(), torque_nm.first());
+    let [lowest_2, highest_2] = of_joint(before_nm.second(), torque_nm.second());
+    [
+        lowest_1.at_least(lowest_2),
+        highest_1.at_most(highest_2).at_most(1.0),
+    ]
+}
+
+#[cfg(test)]
+mod tests {
+    use painleve_shared::{Arm, ArmParameters, GeneralisedTorque, LinkMotion, Posture};
+    use proptest::prelude::*;
+
+    use super::*;
+
+    /// Returns the model of an arm at rest on the belt.
+    fn at_rest() -> Model {
+        let arm = Arm::<f32>::new(ArmParameters::default()).unwrap();
+        let theta_rad = arm
+            .link_angles_on_belt_rad(0.1, Posture::ElbowDown)
+            .unwrap();
+        let rest = LinkMotion::zeros();
+        Model::new(&arm, theta_rad, rest, &GeneralisedTorque::zeros())
+    }
+
+    /// Returns the torques of an acceleration along the belt, m/s².
+    fn motion_nm(model: &Model, acceleration_m_s2: f32) -> JointTorque<f32> {
+        let along = model.link_acceleration_rad_s2(&Vector2::new(acceleration_m_s2, 0.0));
+        model.inverse_dynamics_in_air_nm(&along)
+    }
+
+    #[test]
+    fn pressing_gets_the_torque_that_the_motion_leaves() {
+        let model = at_rest();
+        let pressing_nm = JointTorque::new(1.0, -1.0);
+        for (motion_nm, part) in [(1.0, 1.0), (1.9, 0.1), (1.95, 0.05)] {
+            let motion_nm = JointTorque::new(motion_nm, 0.0);
+            let found = Allocation::new(&model, motion_nm, &pressing_nm, 2.0, 0.0);
+            assert!((found.pressing - part).abs() < 1e-6, "{found:?} {part}");
+            assert!(found.motion_nm == motion_nm && !found.slows);
+        }
+    }
+
+    #[test]
+    fn all_is_left_to_the_output_as_in_the_paper() {
+        let model = at_rest();
+        let (motion_nm, pressing_nm) = (motion_nm(&model, 100.0), JointTorque::new(1.0, -1.0));
+        let found = Allocation::new(&model, motion_nm, &pressing_nm, 0.1, 1.0);
+        assert!(found.motion_nm == motion_nm && found.pressing == 1.0 && !found.slows);
+    }
+
+    proptest! {
+        /// What is left of a motion too fast keeps its direction, and the least force.
+        #[test]
+        fn a_motion_too_fast_is_slowed_along_the_belt(
+            acceleration_m_s2 in -300.0_f32..300.0, force_n in 0.0_f32..20.0, limit_nm in 1.0_f32..3.0,
+        ) {
+            let model = at_rest();
+            let pressing_nm = model.torque_against_nm(&Vector2::new(-0.4 * force_n, force_n));
+            let (least, wanted_nm) = (0.1, motion_nm(&model, acceleration_m_s2));
+            let found = Allocation::new(&model, wanted_nm, &pressing_nm, limit_nm, least);
+            let total_nm = found.motion_nm + pressing_nm * found.pressing;
+            prop_assert!(total_nm.amax() <= limit_nm * 1.0001, "{found:?}");
+            let free = model.free_acceleration_rad_s2(&found.motion_nm);
+            let given = model.jacobian * free.vector();
+            prop_assert!(given.y.abs() < 0.02 * (1.0 + acceleration_m_s2.abs()), "{given}");
+            prop_assert!(found.pressing >= least && (found.pressing == least || !found.slows));
+            prop_assert!((given.x - acceleration_m_s2).abs() < 0.1 || found.slows);
+            prop_assert!(given.x * acceleration_m_s2 >= -0.1 && given.x.abs() <= acceleration_m_s2.abs() + 0.1);
+        }
+    }
+}
