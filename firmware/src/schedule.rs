@@ -9,21 +9,24 @@ pub enum Turn {
     Balance,
     /// The edges of the admissible stretch.
     Edges,
-    /// The response of the contact.
-    Response,
+    /// The averages of the contact's response.
+    Average,
+    /// The bounds of the contact's response.
+    Bound,
 }
 
 impl Turn {
     /// Updates from one turn to the next of the same work.
-    pub const COUNT: f32 = 3.0;
+    pub const COUNT: f32 = 4.0;
 
     /// Takes this turn; another one is next.
     #[inline]
     pub fn take(&mut self) -> Self {
         let next = match self {
             Self::Balance => Self::Edges,
-            Self::Edges => Self::Response,
-            Self::Response => Self::Balance,
+            Self::Edges => Self::Average,
+            Self::Average => Self::Bound,
+            Self::Bound => Self::Balance,
         };
         core::mem::replace(self, next)
     }

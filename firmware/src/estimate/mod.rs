@@ -196,8 +196,10 @@ impl Estimators {
             let withheld_n = observed.rounding_nm.vector().dot(slope) / p_per_kg;
             self.response
                 .update(contact.force_n.y, withheld_n, observed.elapsed_ticks);
-            if turn == Turn::Response {
-                self.response.evaluate();
+            match turn {
+                Turn::Average => self.response.average(),
+                Turn::Bound => self.response.bound(),
+                Turn::Balance | Turn::Edges => {}
             }
         } else {
             self.response.pause();

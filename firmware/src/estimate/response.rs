@@ -15,6 +15,8 @@
 
 use painleve_shared::{Real, settings};
 
+use crate::schedule::Turn;
+
 settings! {
     /// Settings of the estimate of the contact's response.
     #[derive(Copy)]
@@ -41,8 +43,8 @@ const RIGID: f32 = 0.5;
 const EACH_LOOP: f32 = 1.0 / 3.0;
 /// Number of delays between torque and force that are considered, in ticks. With two the torque was noisier (the same).
 const DELAYS: usize = 3;
-/// Readings before which the bounds are not evaluated: fewer may agree by chance.
-const LEAST_READINGS: f32 = 15.0;
+/// Turns before which the bounds are not evaluated: fewer readings may agree by chance.
+const LEAST_TURNS: f32 = 4.0;
 /// The law damps a contact if the upper bound of its response is below this part of [`RIGID`]. With more the torque was noisier (the same).
 const DAMPED: f32 = 0.4;
 /// Time in contact before the correlation starts: a contact that lasts longer is not a bounce, s.
@@ -79,8 +81,8 @@ impl ContactResponse {
 pub struct ResponseEstimator {
     settings: ResponseSettings,
     tick_s: f32,
-    /// Readings over which the averages are taken.
-    most_readings: f32,
+    /// Turns over which the averages are taken.
+    most_turns: f32,
     /// Share for each unit of p that is always allowed, kg.
     least_share_kg: f32,
     /// Last normal force and its last change, N.
@@ -96,11 +98,13 @@ pub struct ResponseEstimator {
     random: u16,
     /// Expected changes of force, N, the latest first.
     expected_n: [f32; DELAYS + 1],
-    /// Averages of first and of second differences.
+    /// Sums of first and of second differences since the last turn.
+    sums: [Moments; 2],
+    /// Averages of such sums.
     averages: [Moments; 2],
-    /// Readings in them, at most those of the averaging time.
-    readings: f32,
-    /// Sum of the squares of the readings' weights in the averages.
+    /// Turns in them, at most those of the averaging time.
+    turns: f32,
+    /// Sum of the squares of the turns' weights in the averages.
     spread: f32,
     /// Distance of the bounds of ρ from first differences.
     width: f32,
@@ -114,7 +118,7 @@ pub struct ResponseEstimator {
     touched_s: f32,
 }
 
-/// Averages, N², of first or of second differences of the force.
+/// Sums or averages over turns, N², of first or of second differences of the force.
 #[derive(Clone, Copy, Debug, Default)]
 struct Moments {
     /// Measured times expected difference, for each delay.
@@ -133,18 +137,28 @@ struct Uncertain {
 }
 
 impl Moments {
-    /// Moves the averages by `weight` towards a measured difference, N, and the ones expected at each delay.
+    /// Adds a measured difference, N, and the ones expected at each delay.
     #[inline]
-    fn add(&mut self, measured_n: f32, expected_n: [f32; DELAYS], weight: f32) {
+    fn add(&mut self, measured_n: f32, expected_n: [f32; DELAYS]) {
         for (product, expected_n) in self.products.iter_mut().zip(expected_n) {
-            *product += weight * (measured_n * expected_n - *product);
+            *product += measured_n * expected_n;
         }
         let [_, expected_n, _] = expected_n;
-        self.expected += weight * (expected_n * expected_n - self.expected);
-        self.measured += weight * (measured_n * measured_n - self.measured);
+        self.expected += expected_n * expected_n;
+        self.measured += measured_n * measured_n;
     }
 
-    /// Returns ρ from averages of readings whose squared weights have this sum.
+    /// Moves the averages by `weight` towards the sums of a turn.
+    #[inline(never)]
+    fn approach(&mut self, sums: &Self, weight: f32) {
+        for (average, sum) in self.products.iter_mut().zip(sums.products) {
+            *average += weight * (sum - *average);
+        }
+        self.expected += weight * (sums.expected - self.expected);
+        self.measured += weight * (sums.measured - self.measured);
+    }
+
+    /// Returns ρ from averages of turns whose squared weights have this sum.
     #[inline(never)]
     fn response(&self, spread: f32) -> Uncertain {
         let largest = |most: f32, product: &f32| product.at_least(most);
@@ -152,7 +166,7 @@ impl Moments {
         // Not zero where nothing was expected: the response is then unknown.
         let square = self.expected.at_least(1e-12);
         let variance = spread * self.measured * square;
-        let deviation = variance.square_root() / square;
+        let deviation = (variance / Turn::COUNT).square_root() / square;
         Uncertain {
             response: most / square,
             deviation,
@@ -166,7 +180,7 @@ impl ResponseEstimator {
         Self {
             settings: *settings,
             tick_s,
-            most_readings: AVERAGING_S / tick_s,
+            most_turns: (AVERAGING_S / (Turn::COUNT * tick_s)).at_least(1.0),
             least_share_kg: settings.least_damping_ns_m * tick_s,
             force_n: 0.0,
             change_n: 0.0,
@@ -176,8 +190,9 @@ impl ResponseEstimator {
             probe_n: 0.0,
             random: 1,
             expected_n: [0.0; DELAYS + 1],
+            sums: Default::default(),
             averages: Default::default(),
-            readings: 0.0,
+            turns: 0.0,
             spread: 1.0,
             width: 1.0,
             gain: if settings.enabled { 0.0 } else { 1.0 },
@@ -210,7 +225,7 @@ impl ResponseEstimator {
         }
     }
 
-    /// Adds one tick of a tip that slides in contact to the averages. `normal_force_n` is the measured force (N),
+    /// Adds one tick of a tip that slides in contact to the sums. `normal_force_n` is the measured force (N),
     /// `withheld_n` the one that the torque withheld by rounding would cause on a rigid contact (N), and `elapsed_ticks`
     /// the time since the previous readings.
     #[inline]
@@ -241,20 +256,32 @@ impl ResponseEstimator {
             // As much as there is to find out.
             self.draw_probe(self.width.at_most(1.0) * self.settings.probe_n);
         }
+        let [first, second] = &mut self.sums;
+        first.add(change_n, [e0, e1, e2]);
+        second.add(change_of_change_n, [e0 - e1, e1 - e2, e2 - e3]);
+    }
+
+    /// Updates the averages with the readings since the last turn.
+    #[inline(never)]
+    pub fn average(&mut self) {
+        if self.touched_s < SETTLING_S {
+            return;
+        }
         // A plain mean until it covers the averaging time.
-        self.readings = (self.readings + 1.0).at_most(self.most_readings);
-        let weight = 1.0 / self.readings;
+        self.turns = (self.turns + 1.0).at_most(self.most_turns);
+        let weight = 1.0 / self.turns;
         let rest = 1.0 - weight;
         self.spread = rest * rest * self.spread + weight * weight;
-        let [first, second] = &mut self.averages;
-        first.add(change_n, [e0, e1, e2], weight);
-        second.add(change_of_change_n, [e0 - e1, e1 - e2, e2 - e3], weight);
+        let sums = core::mem::take(&mut self.sums);
+        for (averages, sums) in self.averages.iter_mut().zip(&sums) {
+            averages.approach(sums, weight);
+        }
     }
 
     /// Updates the bounds of ρ from the averages.
     #[inline(never)]
-    pub fn evaluate(&mut self) {
-        if self.readings < LEAST_READINGS {
+    pub fn bound(&mut self) {
+        if self.turns < LEAST_TURNS {
             return;
         }
         let [first, second] = &self.averages;

@@ -29,8 +29,10 @@ fn observed_after(
     for tick in 0..ticks {
         let force_n = contact(commanded) + 0.03 * noise(3 * tick);
         estimator.update(force_n, withheld, elapsed_ticks(tick));
-        if tick % 3 == 0 {
-            estimator.evaluate();
+        match tick % Turn::COUNT as u32 {
+            0 => estimator.average(),
+            1 => estimator.bound(),
+            _ => {}
         }
         let next = 0.05 * noise(3 * tick + 1);
         commanded = 10.0 + next - withheld + probe_n;
@@ -141,9 +143,15 @@ fn a_few_readings_show_nothing() {
         state.update(10.0, 0.0, 1);
     }
     let unknown = state.response(P_PER_KG, P_RATIO);
-    for tick in 1..LEAST_READINGS as u32 {
-        state.update(10.0, 0.05 * noise(tick), 1);
-        state.evaluate();
+    let turn = |state: &mut ResponseEstimator, number: u32| {
+        for tick in 0..Turn::COUNT as u32 {
+            state.update(10.0, 0.05 * noise(10 * number + tick), 1);
+        }
+        state.average();
+        state.bound();
+    };
+    for number in 1..LEAST_TURNS as u32 {
+        turn(&mut state, number);
         let found = state.response(P_PER_KG, P_RATIO);
         assert_eq!(
             ContactResponse {
@@ -153,8 +161,7 @@ fn a_few_readings_show_nothing() {
             unknown
         );
     }
-    state.update(10.0, 0.0, 1);
-    state.evaluate();
+    turn(&mut state, 0);
     assert_eq!(state.response(P_PER_KG, P_RATIO).lags, 1.0);
 }
 

@@ -18,7 +18,7 @@ pub enum Part {
     FrictionFeedForward,
     /// Integral of the position error.
     PositionIntegral,
-    /// Reduction of the normal force where the torque is limited.
+    /// Less normal force, then a slower motion, where the torque is limited.
     ForceReduction,
     /// Gradual rise of the normal force: after landing, and where the torque was limited.
     ForceRamp,
