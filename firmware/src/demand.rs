@@ -22,8 +22,9 @@ pub struct TorqueDemand<L: Law> {
 }
 
 impl<L: Law> TorqueDemand<L> {
-    /// Makes the demand of this configuration, with motion loops of the law faster by the factor `speed`.
-    pub fn new(configuration: &Configuration<L>, speed: f32) -> Self {
+    /// Makes the demand of this configuration, with motion loops of the law faster by the factor `speed`, for an output that
+    /// gives up to ±`torque_limit_nm`.
+    pub fn new(configuration: &Configuration<L>, speed: f32, torque_limit_nm: f32) -> Self {
         let settings = &configuration.settings;
         let law = settings.law.at_speed(speed);
         Self {
@@ -32,7 +33,7 @@ impl<L: Law> TorqueDemand<L> {
             law,
             recovery: settings.recovery,
             tick_s: configuration.tick_s(),
-            torque_limit_nm: settings.torque_limit_nm,
+            torque_limit_nm,
         }
     }
 

@@ -24,6 +24,11 @@ impl TorqueOutput {
         Self { converter, limit }
     }
 
+    /// Returns the largest torque that it gives, N·m.
+    pub fn limit_nm(&self) -> f32 {
+        self.converter.value(self.limit)
+    }
+
     /// Returns the counts that are given where these are wanted.
     #[inline]
     pub fn limited(&self, counts: i32) -> i32 {
@@ -49,8 +54,7 @@ impl TorqueOutput {
         let given = counts.map(|counts| self.converter.value(counts));
         command.counts = counts.map(TorqueCounts);
         command.torque_nm = JointTorque::from_array(given);
-        // A torque at the limit is not short of the desired one because it has been rounded.
-        command.saturated = (wanted_nm - command.torque_nm).amax() > self.converter.per_count;
+        command.saturated = counts != nearest;
         // What the limit withholds is not owed.
         let withheld = (owed - command.torque_nm).to_array();
         let rounding = [0, 1].map(|joint| {

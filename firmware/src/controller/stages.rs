@@ -58,6 +58,7 @@ impl<L: Law> Stages<L> {
         };
         let (tick_hz, tick_s) = (configuration.tick_hz, configuration.tick_s());
         let torque_limit_nm = settings.torque_limit_nm;
+        let torques = TorqueOutput::new(converters.torque, torque_limit_nm);
         let force_cell = converters.force.converter();
         let estimates = Estimators {
             contact: ContactEstimate {
@@ -80,7 +81,7 @@ impl<L: Law> Stages<L> {
         Self {
             estimates,
             command: LastCommand::default(),
-            demand: TorqueDemand::new(configuration, speed),
+            demand: TorqueDemand::new(configuration, speed, torques.limit_nm()),
             supervisor: Supervisor::new(settings.supervisor, settings.lapses, tick_hz),
             references: References::new(
                 EdgeGovernor::new(
@@ -95,7 +96,7 @@ impl<L: Law> Stages<L> {
             observed: Observed::default(),
             turn: Turn::default(),
             arrivals: ArrivalState::default(),
-            torques: TorqueOutput::new(converters.torque, torque_limit_nm),
+            torques,
         }
     }
 

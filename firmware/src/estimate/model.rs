@@ -30,7 +30,7 @@ pub struct Model {
     /// ∂w/∂θ, N·m/rad.
     stiffness_nm_rad: Matrix2<f32>,
     /// w + c − d with the friction of the joints, N·m.
-    pub(super) bias_nm: GeneralisedTorque<f32>,
+    pub(crate) bias_nm: GeneralisedTorque<f32>,
     /// Centrifugal torque on link 2 for each rad²/s² of link 1, and on link 1 against that of link 2, N·m·s².
     centrifugal_nms2: f32,
     /// Centripetal acceleration s of the tip, m/s².

@@ -180,7 +180,7 @@ impl ResponseEstimator {
         Self {
             settings: *settings,
             tick_s,
-            most_turns: (AVERAGING_S / (Turn::COUNT * tick_s)).at_least(1.0),
+            most_turns: (AVERAGING_S / (Turn::COUNT * tick_s)).at_least(LEAST_TURNS),
             least_share_kg: settings.least_damping_ns_m * tick_s,
             force_n: 0.0,
             change_n: 0.0,
