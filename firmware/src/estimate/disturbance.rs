@@ -177,19 +177,9 @@ mod tests {
             let (rest, unloaded) = (LinkMotion::zeros(), Vector2::zeros());
             observed(truth, rest, unloaded, Some(p_ratio), 50).amax() / truth.amax()
         };
-        // The first of the 50 updates only takes the rates.
-        let adopted = |weight: f32| 1.0 - libm::powf(1.0 - weight, 49.0);
-        let weight = DisturbanceSettings::default().bandwidth_rad_s * Turn::COUNT * TICK_S;
-        assert!(
-            (after(1.0) - adopted(weight)).abs() < 2e-3,
-            "{}",
-            after(1.0)
-        );
-        assert!(
-            (after(0.02) - adopted(0.02 * SHARE)).abs() < 2e-3,
-            "{}",
-            after(0.02)
-        );
+        // 1 − (1 − 0.08)⁴⁹ and 1 − (1 − 0.1 · 0.02)⁴⁹.
+        assert!((after(1.0) - 0.9832).abs() < 2e-3, "{}", after(1.0));
+        assert!((after(0.02) - 0.0934).abs() < 2e-3, "{}", after(0.02));
         assert_eq!(after(-0.1), 0.0);
     }
 

@@ -102,6 +102,11 @@ mod tests {
             assert!((found.pressing - part).abs() < 1e-6, "{found:?} {part}");
             assert!(found.motion_nm == motion_nm && !found.slows);
         }
+        let motion_nm = JointTorque::new(3.0, 0.0);
+        for least in [0.0, 1.0] {
+            let found = Allocation::new(&model, motion_nm, &pressing_nm, 2.0, least);
+            assert!(found.pressing == least && found.slows, "{found:?}");
+        }
     }
 
     proptest! {
