@@ -96,15 +96,24 @@ pub fn run(arguments: &TestArguments) -> Result<(), ChoreError> {
     keep("tests of the workspace", &mut || {
         workspace_tests(arguments, &mut left_out)
     });
-    keep("tests of the documentation", &mut || {
-        run_cargo(&["test", "--workspace", "--profile", PROFILE, "--doc"])
-    });
+    let documentation = || run_cargo(&["test", "--workspace", "--profile", PROFILE, "--doc"]);
     if arguments.all {
+        keep("tests of the documentation", &mut { documentation });
         for (name, mut step) in FURTHER_STEPS {
             keep(name, &mut step);
         }
     } else {
-        keep("chaos", &mut chaos::short);
+        // Beside each other: processes that are killed mostly wait.
+        keep("tests of the documentation and chaos", &mut || {
+            std::thread::scope(|scope| {
+                let chaos = scope.spawn(chaos::short);
+                let documentation = documentation();
+                chaos
+                    .join()
+                    .map_err(|_| ChoreError("chaos: a thread panicked".into()))?
+                    .and(documentation)
+            })
+        });
         let further: Vec<&str> = FURTHER_STEPS.iter().map(|(name, _)| *name).collect();
         left_out.push(format!(
             "left to `cargo xtask test --all`: tests marked #[ignore], {}",
@@ -159,8 +168,8 @@ fn workspace_tests(
             "--tests",
         ]
     };
-    // Some tests wait for time-outs: one more at a time than processors keeps these busy.
-    let threads = std::thread::available_parallelism().map_or(2, |count| count.get() + 1);
+    // Some tests wait for time-outs: two more at a time than processors keep these busy.
+    let threads = std::thread::available_parallelism().map_or(3, |count| count.get() + 2);
     let threads = threads.to_string();
     if has_nextest {
         line.extend(["--test-threads", &threads]);
