@@ -93,9 +93,12 @@ fn is_found_from(factors: [f64; 3]) {
     let trials = search(&tuning, 120, Vec::new());
     let best = trials.iter().min_by(|a, b| a.cost.total_cmp(&b.cost));
     let tuned = tuning.with(&best.unwrap().values).unwrap();
-    // In cases that the search has not seen.
-    let [tuned, known] = [&tuned, &built_in].map(|it| tuning.score(it, 4, 10).unwrap());
-    assert!(tuned.cost(&known) < 1.0, "{tuned:?} {known:?}");
+    // In cases that the search has not seen, by the cost that it makes small: beside the gains from which it starts.
+    let [tuned, known, start] =
+        [&tuned, &built_in, &tuning.scenario].map(|it| tuning.score(it, 4, 10).unwrap());
+    let [tuned, known] = [tuned, known].map(|it| it.cost(&start));
+    // Six trials reach 0.61 and 0.65.
+    assert!(tuned < known.min(0.6), "{tuned} {known}");
 }
 
 #[test]
