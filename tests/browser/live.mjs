@@ -66,7 +66,7 @@ try {
   const settings = await saved("save");
   for (const part of ["friction = 1.2", "seed = 77", "[controller.law.pid]"]) check(settings.includes(part), `${part} is saved`);
   const changes = await saved("save-changes");
-  for (const part of ["painleve run ", "--set 'belt.friction=1.2'", "--set 'run.seed=77'", "--set 'controller.law={ pid = {} }'"]) check(changes.includes(part), `${part} is among the changes`);
+  for (const part of ["painleve run ", "--set belt.friction=1.2", "--set run.seed=77", "--set 'controller.law={ pid = {} }'"]) check(changes.includes(part), `${part} is among the changes`);
   await browser.quiet("after settings");
 
   await browser.set(field("belt.friction"), "7000");

@@ -371,7 +371,7 @@ fn submit_slurm(arguments: &SlurmArguments) -> Result<(), CommandError> {
     let path = arguments.out.as_ref().unwrap_or(&default);
     distinct_files::check_distinct(&[("--out", path)])?;
     atomic_file::write(path, script.as_bytes()).map_err(output)?;
-    let command = format!("sbatch {}", path.display());
+    let command = format!("sbatch {}", outcome::quoted(&path.display().to_string()));
     let result =
         json!({ "missing": array, "script": path.display().to_string(), "command": command });
     arguments.json.say(

@@ -16,6 +16,7 @@ use painleve_plant::decimal::as_written;
 use painleve_plant::scenario::{Knowledge, Scenario, ScenarioError, built_in};
 use painleve_shared::mounting::SensorParts;
 use painleve_shared::range::OutOfRange;
+use painleve_study_core::outcome::quoted;
 use serde_json::json;
 
 use self::board_rig::BoardRig;
@@ -137,14 +138,15 @@ pub fn run(arguments: &CommissionArguments) -> Result<(), CommandError> {
     report(arguments, &output_path, &deviations, commissioned.friction)?;
     let sensors = corrected.converters.mounting.sensors;
     if sensors == SensorParts::Both && !arguments.second_sensors && !arguments.json {
-        let scenario = output_path.display();
+        let word = |path: &Path| quoted(&path.display().to_string());
         let rig = match &arguments.port {
-            Some(port) => format!("--port {}", port.display()),
+            Some(port) => format!("--port {}", word(port)),
             None => "--rehearse".to_owned(),
         };
         say(format_args!(
-            "next, the second sensors: painleve commission {scenario} {rig} --second-sensors --output {}",
-            output_path.with_extension("second.toml").display()
+            "next, the second sensors: painleve commission {} {rig} --second-sensors --output {}",
+            word(&output_path),
+            word(&output_path.with_extension("second.toml"))
         ))?;
     }
     Ok(())

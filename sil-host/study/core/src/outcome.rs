@@ -35,8 +35,12 @@ pub fn csv(outcome: &impl Outcome) -> Result<Vec<u8>, csv::Error> {
 
 pub use painleve_process::terminal::table;
 
-/// Returns a text as one word of a shell.
+/// Returns a text as one word of a shell, in quotes if it needs them.
 pub fn quoted(text: &str) -> String {
+    let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_./=:,@%+".contains(c);
+    if !text.is_empty() && text.chars().all(is_plain) {
+        return text.to_owned();
+    }
     // A single quote ends the shell's quotation.
     format!("'{}'", text.replace('\'', "'\\''"))
 }
@@ -46,5 +50,20 @@ pub fn name(value: &impl Serialize) -> String {
     match serde_json::to_value(value) {
         Ok(serde_json::Value::String(name)) => name,
         other => format!("{other:?}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::quoted;
+
+    #[test]
+    fn only_what_a_shell_would_read_otherwise_is_quoted() {
+        assert_eq!(quoted("out/commissioned.toml"), "out/commissioned.toml");
+        assert_eq!(quoted("belt.friction=1.2"), "belt.friction=1.2");
+        assert_eq!(quoted("my arm.toml"), "'my arm.toml'");
+        assert_eq!(quoted("name=it's"), r"'name=it'\''s'");
+        assert_eq!(quoted("$HOME"), "'$HOME'");
+        assert_eq!(quoted(""), "''");
     }
 }

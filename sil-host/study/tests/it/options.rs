@@ -54,6 +54,14 @@ fn keys_that_the_study_itself_sets_are_refused() {
         ),
         ("effects --set run.duration_s=2", "run.duration_s"),
         (
+            "ablation --on half --set initial.theta1_deg=1",
+            "initial.theta1_deg",
+        ),
+        (
+            "ablation --on rigid,capture --set run.duration_s=2",
+            "run.duration_s",
+        ),
+        (
             "loop --tip=0.1 --set controller.response.enabled=true",
             "controller.response.enabled",
         ),
@@ -68,6 +76,7 @@ fn keys_that_the_study_itself_sets_are_refused() {
         "loop --tip=0.1 --set contact.kind=compliant --set controller.response.enabled=false",
         "effects --runs 1 --contact compliant --effect none --set contact.stiffness_n_m=1e5",
         "ablation --on rigid --set belt.friction=0.5",
+        "ablation --on rigid --set run.duration_s=2",
     ] {
         assert_eq!(refusal(line), "accepted", "{line}");
     }

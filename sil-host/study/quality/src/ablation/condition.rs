@@ -5,8 +5,8 @@ use painleve_study_core::StudyError;
 use painleve_study_core::case::ControllerChoice;
 use serde::Serialize;
 
-use crate::capture::Capture;
-use crate::effects::{Contact, EffectsStudy};
+use crate::capture::{self, Capture};
+use crate::effects::{self, Contact, EffectsStudy};
 use crate::robustness::{Arms, Criterion, LiftOffRule, Robustness};
 
 /// A kind of random closed loop.
@@ -30,6 +30,15 @@ pub enum Condition {
 }
 
 impl Condition {
+    /// The keys that the condition sets in every run.
+    pub fn fixed_keys(self) -> &'static [&'static str] {
+        match self {
+            Self::Rigid | Self::Compliant => &[],
+            Self::Soft | Self::Hanging | Self::Patches | Self::Half => &effects::FIXED,
+            Self::Capture => &capture::FIXED,
+        }
+    }
+
     /// Returns the scenario of run `index`, and how its lift-offs are judged.
     ///
     /// # Errors

@@ -44,6 +44,9 @@ impl StudyOptions for Options {
             runs: self.runs.runs,
             overrides: self.runs.overrides(),
         };
+        for condition in &study.conditions {
+            self.runs.set.refuse_fixed(condition.fixed_keys())?;
+        }
         study.check()?;
         Ok(study)
     }

@@ -32,6 +32,9 @@ const LIMIT_S: f64 = 0.5;
 const WATCHED_S: f64 = 0.1;
 const WITHIN_M: f64 = 1e-3;
 
+/// The keys that the study sets in every run.
+pub const FIXED: [&str; 2] = ["run.enable_at_s", "run.duration_s"];
+
 /// Settings of the study.
 #[derive(Clone, Debug)]
 pub struct Capture {

@@ -6,7 +6,7 @@ use painleve_study_core::catalogue::{InShards, StudyOptions, in_shards};
 use painleve_study_core::options::RandomRuns;
 use painleve_study_core::trial::Trial;
 
-use super::{Capture, Captures, Row};
+use super::{Capture, Captures, FIXED, Row};
 
 /// Time until a bouncing arm is captured.
 #[derive(Debug, Args)]
@@ -22,8 +22,7 @@ impl StudyOptions for Options {
     type Outcome = Captures;
 
     fn study(&self) -> Result<Capture, StudyError> {
-        let fixed = ["run.enable_at_s", "run.duration_s"];
-        self.runs.set.refuse_fixed(&fixed)?;
+        self.runs.set.refuse_fixed(&FIXED)?;
         let study = Capture {
             seed: self.runs.seed,
             runs: self.runs.runs,

@@ -31,6 +31,9 @@ pub use list::{EFFECTS, find};
 pub use options::Options;
 pub use outcome::{EffectsOutcome, LevelSuccess};
 
+/// The keys that the study draws for every run.
+pub const FIXED: [&str; 3] = ["initial", "controller.reference", "run.duration_s"];
+
 /// Settings of the study.
 #[derive(Clone, Debug)]
 pub struct EffectsStudy {

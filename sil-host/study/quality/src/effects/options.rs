@@ -7,7 +7,7 @@ use painleve_study_core::catalogue::{InShards, StudyOptions, in_shards};
 use painleve_study_core::grid::once;
 use painleve_study_core::options::{ControllerOptions, RandomRuns, level};
 
-use super::{Contact, EFFECTS, EffectsOutcome, EffectsStudy, Row, find};
+use super::{Contact, EFFECTS, EffectsOutcome, EffectsStudy, FIXED, Row, find};
 use crate::robustness::Criterion;
 
 /// How often the tip is kept, and where it ends, against the level of each effect of a real rig.
@@ -58,7 +58,7 @@ impl StudyOptions for Options {
     fn study(&self) -> Result<EffectsStudy, StudyError> {
         let set = &self.runs.set;
         set.refuse(&[("contact.kind", "--contact")])?;
-        set.refuse_fixed(&["initial", "controller.reference", "run.duration_s"])?;
+        set.refuse_fixed(&FIXED)?;
         let mut effects = vec![EFFECTS[0].name];
         if self.effect.is_empty() {
             effects.extend(EFFECTS[1..].iter().map(|effect| effect.name));
