@@ -6,7 +6,7 @@ use painleve_chart::markup::{document, escaped};
 use painleve_commission::identification::Found;
 use painleve_identify::Parameter;
 use painleve_identify::parameters::JOINT_NAMES;
-use painleve_identify::torques::{Estimate, Joint};
+use painleve_identify::torques::{Cell, Estimate, Joint};
 use painleve_process::terminal;
 use serde_json::{Value, json};
 
@@ -21,7 +21,7 @@ struct Table {
 /// Returns the result as text.
 pub fn text(found: &Found) -> String {
     let mut text = String::new();
-    for Table { header, rows } in [geometry(found), joints(found)] {
+    for Table { header, rows } in [geometry(found), joints(found), cells(found)] {
         let mut table = terminal::table(header);
         table.add_rows(rows);
         text += &terminal::readable_table(table);
@@ -40,7 +40,7 @@ pub fn html(name: &str, found: &Found, changed: &[String], place: &str) -> Strin
     for sentence in sentences(found).iter().map(String::as_str).chain([place]) {
         let _ = write!(body, "<p>{}</p>", escaped(sentence));
     }
-    for Table { header, rows } in [geometry(found), joints(found)] {
+    for Table { header, rows } in [geometry(found), joints(found), cells(found)] {
         body += "<table><tr>";
         for name in header {
             let _ = write!(body, "<th>{name}");
@@ -71,8 +71,9 @@ pub fn json(found: &Found) -> Value {
             "deviation_before": found.prior.deviations[parameter.index()],
         })
     });
+    let of = |it: Estimate| json!({ "value": it.value, "deviation": it.deviation });
+    let of_cell = |cell: Cell| json!({ "gain": of(cell.gain), "cross_talk": of(cell.cross_talk) });
     let of_joint = |joint: Joint| {
-        let of = |it: Estimate| json!({ "value": it.value, "deviation": it.deviation });
         json!({
             "coulomb_friction_nm": of(joint.friction_nm),
             "stiffness_nm_rad": of(joint.stiffness_nm_rad),
@@ -83,6 +84,7 @@ pub fn json(found: &Found) -> Value {
     json!({
         "parameters": parameters,
         "joints": found.joints.joints.map(of_joint),
+        "force_cells": found.joints.cells.map(of_cell),
         "torque_left_over_nm": found.joints.left_over_nm,
         "tip_deviation_m": identified.tip_deviation_m,
         "tip_deviation_before_m": found.prior.tip_deviation_m(),
@@ -182,7 +184,7 @@ fn geometry(found: &Found) -> Table {
 fn joints(found: &Found) -> Table {
     type Of = fn(&Joint) -> Estimate;
     let rows: [(&str, Of, f64, usize, &str); 4] = [
-        ("friction", |it| it.friction_nm, 1e3, 0, "mN·m"),
+        ("friction", |it| it.friction_nm, 1e3, 1, "mN·m"),
         (
             "stiffness of the spring",
             |it| it.stiffness_nm_rad,
@@ -202,6 +204,26 @@ fn joints(found: &Found) -> Table {
     });
     Table {
         header: ["", "joint 1", "elbow", "unit"],
+        rows: rows.into(),
+    }
+}
+
+/// Returns what the torques show of the force cells. No setting takes it: it is for information.
+fn cells(found: &Found) -> Table {
+    type Of = fn(&Cell) -> Estimate;
+    let rows: [(&str, Of); 2] = [
+        ("reading to force", |it| it.gain),
+        ("share of the other force", |it| it.cross_talk),
+    ];
+    let rows = rows.map(|(name, of)| {
+        let [along, normal] = found.joints.cells.map(|cell| {
+            let Estimate { value, deviation } = of(&cell);
+            spread(value, deviation, 3)
+        });
+        [name.into(), along, normal, String::new()]
+    });
+    Table {
+        header: ["", "along the belt", "normal force", "unit"],
         rows: rows.into(),
     }
 }
