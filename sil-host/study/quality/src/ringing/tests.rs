@@ -53,13 +53,16 @@ proptest! {
 
 #[test]
 fn the_measured_onset_is_at_the_limit() {
-    let study = Ringing {
-        stiffness_n_m: 1e5,
-        dampings_ns_m: vec![76.0],
-        rates_per_s: vec![67.0],
-        overrides: Vec::new(),
-    };
-    let row = study.row(0).unwrap();
-    let (onset, limit) = (row.onset_p_ratio.unwrap(), row.limit_p_ratio.unwrap());
-    assert!((onset / limit - 1.0).abs() < 0.1, "{row:?}");
+    // Within a second, a slow observer throws the tip off somewhat inside the limit, and the tip may come to rest again.
+    for (rate_per_s, most) in [(67.0, 1.1), (10.0, 1.25)] {
+        let study = Ringing {
+            stiffness_n_m: 1e5,
+            dampings_ns_m: vec![76.0],
+            rates_per_s: vec![rate_per_s],
+            overrides: Vec::new(),
+        };
+        let row = study.row(0).unwrap();
+        let (onset, limit) = (row.onset_p_ratio.unwrap(), row.limit_p_ratio.unwrap());
+        assert!(onset > 0.9 * limit && onset < most * limit, "{row:?}");
+    }
 }
