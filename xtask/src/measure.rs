@@ -266,11 +266,24 @@ struct Here {
     machine: String,
 }
 
+/// Returns the commit, with `-dirty` if anything but results and the pages that display them differs from it: measuring one
+/// table after another needs no commit in between.
+fn commit() -> Result<String, ChoreError> {
+    let commit = answer("git", &["describe", "--always", "--exclude=*"])?;
+    let paths = ["--", ":/", ":(top,exclude)docs", ":(top,exclude)README.md"];
+    let changed = answer("git", &[&["status", "--porcelain"][..], &paths].concat())?;
+    Ok(if changed.is_empty() {
+        commit
+    } else {
+        commit + "-dirty"
+    })
+}
+
 impl Here {
     fn new() -> Result<Self, ChoreError> {
         let mut here = Self {
             source: String::new(),
-            commit: answer("git", &["describe", "--always", "--dirty", "--exclude=*"])?,
+            commit: commit()?,
             date: answer("date", &["--iso-8601=date"])?,
             machine: machine(),
         };
