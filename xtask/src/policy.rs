@@ -12,6 +12,13 @@ const LEAST_RUST: &str = env!("CARGO_PKG_RUST_VERSION");
 /// Checker of licences and sources; installed by hand, because its compilation takes minutes.
 const DENY: &str = "cargo-deny";
 
+/// Every workspace with a lock file of its own.
+const WORKSPACES: [&str; 3] = [
+    "Cargo.toml",
+    "fmu/Cargo.toml",
+    "examples/own-firmware/Cargo.toml",
+];
+
 /// Installs the least Rust version, if rustup can, and returns what is missing.
 pub fn install() -> Vec<&'static str> {
     let install = ["toolchain", "install", LEAST_RUST, "--profile", "minimal"];
@@ -67,5 +74,10 @@ pub fn dependencies() -> Result<(), ChoreError> {
     if !starts(DENY) {
         return Ok(());
     }
-    run("cargo", &["deny", "check", "licenses", "bans", "sources"])
+    for manifest in WORKSPACES {
+        let of = ["deny", "--manifest-path", manifest, "--config", "deny.toml"];
+        let check = ["check", "licenses", "bans", "sources"];
+        run("cargo", &[&of[..], &check].concat())?;
+    }
+    Ok(())
 }
