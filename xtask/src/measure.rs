@@ -271,7 +271,8 @@ struct Here {
 fn commit() -> Result<String, ChoreError> {
     let commit = answer("git", &["describe", "--always", "--exclude=*"])?;
     let paths = ["--", ":/", ":(top,exclude)docs", ":(top,exclude)README.md"];
-    let changed = answer("git", &[&["status", "--porcelain"][..], &paths].concat())?;
+    let status = ["status", "--porcelain", "--untracked-files=no"];
+    let changed = answer("git", &[&status[..], &paths].concat())?;
     Ok(if changed.is_empty() {
         commit
     } else {

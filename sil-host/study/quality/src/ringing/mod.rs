@@ -173,7 +173,7 @@ impl Ringing {
                 (least_n, most_n) = (least_n.min(force_n), most_n.max(force_n));
             }
         }
-        Ok(most_n - least_n > 2.0 * RINGING_N)
+        Ok(!presses || most_n - least_n > 2.0 * RINGING_N)
     }
 }
 
