@@ -70,6 +70,9 @@ pub enum RecordFileError {
 /// A file or option cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum InputError {
+    /// No key of a scenario contains a text.
+    #[error("--keys {0}: no key contains this; `painleve scenarios --keys` lists all")]
+    NoKey(String),
     /// A file has no planar two-link arm.
     #[error("{}: {reason}", path.display())]
     Arm {

@@ -17,7 +17,10 @@ pub struct ScenariosArguments {
     /// Print a JSON Schema of scenario files, with which editors complete and check them.
     #[arg(long, conflicts_with = "scenario")]
     schema: bool,
-    /// Print JSON: names and descriptions, or the whole scenario.
+    /// List every key with its default, range and meaning, or those that contain PART.
+    #[arg(long, value_name = "PART", num_args = 0..=1, default_missing_value = "", conflicts_with_all = ["scenario", "schema"])]
+    keys: Option<String>,
+    /// Print JSON: names and descriptions, the whole scenario, or the list of keys.
     #[arg(long, conflicts_with = "schema")]
     json: bool,
     /// Print only the keys whose values are not the defaults.
@@ -28,7 +31,7 @@ pub struct ScenariosArguments {
     overrides: Vec<String>,
 }
 
-/// Lists the built-in scenarios, or prints one of them or the schema.
+/// Lists the built-in scenarios or all keys, or prints a scenario or the schema.
 ///
 /// # Errors
 /// [`CommandError`] if the scenario is invalid, or the output cannot be written.
@@ -53,6 +56,9 @@ pub fn run(arguments: &ScenariosArguments) -> Result<(), CommandError> {
     if arguments.schema {
         return say(format!("{:#}", describe::json_schema()));
     }
+    if let Some(part) = &arguments.keys {
+        return list_keys(part, arguments.json);
+    }
     let load = |name| Scenario::load(name, &[]).map(|scenario| (name, scenario.description));
     let scenarios: Vec<_> = built_in::names().map(load).collect::<Result<_, _>>()?;
     if arguments.json {
@@ -62,6 +68,26 @@ pub fn run(arguments: &ScenariosArguments) -> Result<(), CommandError> {
     let mut table = terminal::table(["scenario", "description"]);
     for (name, description) in &scenarios {
         table.add_row([*name, description]);
+    }
+    say(terminal::readable_table(table))
+}
+
+fn list_keys(part: &str, as_json: bool) -> Result<(), CommandError> {
+    let mut settings = describe::settings();
+    settings.retain(|setting| setting.key.contains(part));
+    if settings.is_empty() {
+        return Err(InputError::NoKey(part.into()).into());
+    }
+    if as_json {
+        return say(serde_json::to_string(&settings).map_err(output)?);
+    }
+    let mut table = terminal::table(["key", "default", "allowed", "meaning"]);
+    for setting in &settings {
+        let key = match setting.kinds.as_slice() {
+            [] => setting.key.clone(),
+            kinds => format!("{} ({})", setting.key, kinds.join(", ")),
+        };
+        table.add_row([&key, &setting.default, &setting.allowed, &setting.meaning]);
     }
     say(terminal::readable_table(table))
 }

@@ -256,6 +256,10 @@ fn options_without_effect_are_refused() {
             "--diff has no effect without SCENARIO",
         ),
         ("scenarios --schema --set belt.friction=0.4", "--set"),
+        (
+            "scenarios --keys frictoin",
+            "--keys frictoin: no key contains",
+        ),
         ("timing edge --host native --elf x", "--elf"),
         ("drive edge --port x --stored --record x", "--record"),
     ] {

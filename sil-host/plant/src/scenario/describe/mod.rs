@@ -4,11 +4,11 @@
 //! - [`Scenario::to_brief_toml`]: a scenario without what has its default
 //! - [`Scenario::differences`]: the keys in which two scenarios differ
 //! - [`json_schema`]: the same for editors
-//! - [`settings_table`]: tables for the documentation
+//! - [`settings`]: a list of all keys
 
 mod commented;
 mod difference;
-mod markdown;
+mod list;
 mod schema;
 
 use std::f64::consts::PI;
@@ -20,7 +20,7 @@ use toml::{Table, Value};
 use super::Scenario;
 
 pub use difference::Difference;
-pub use markdown::settings_table;
+pub use list::{Setting, settings};
 pub use schema::json_schema;
 
 impl Scenario {
