@@ -15,7 +15,7 @@ use serde_json::Value;
 use toml::Table;
 
 use crate::command::{ChoreError, answer, cargo, run_with, say, workspace};
-use crate::under_test::{build_program, program, run_tests};
+use crate::under_test::{PROFILE, build_program, program, run_tests};
 
 #[derive(Debug, Args)]
 pub struct MeasureArguments {
@@ -34,31 +34,23 @@ pub struct MeasureArguments {
 
 const HEAD: &str = "# Names, labels, commands and `keep` are written by hand, each `result` by `cargo xtask measure`.\n\n";
 
-/// Tests that write figures into the pages: the name here, the package and the test. They compare them in every run.
-const BLOCKS: [(&str, &str, &str); 6] = [
-    ("ticks", "painleve-tests", "the_image_"),
-    ("bound", "painleve-tests", "a_tick_has_bounds"),
-    (
-        "worst-ticks",
-        "painleve-flash-image",
-        "the_worst_readings_found",
-    ),
-    (
-        "release",
-        "painleve-flash-image",
-        "ticks_begin_within_the_bound",
-    ),
-    (
-        "stuck-sensors",
-        "painleve-flash-image",
-        "a_stuck_sensor_does",
-    ),
-    (
-        "control-rates",
-        "painleve-flash-image",
-        "a_board_accepts_the_control_rates",
-    ),
+/// Tests that write figures into the pages: the name here, and what the tests' names contain. They compare them in every
+/// run.
+const BLOCKS: [(&str, &str); 6] = [
+    ("ticks", "with_the_same_counts_within_budget"),
+    ("bound", "a_tick_has_bounds_within_the_budget"),
+    ("worst-ticks", "the_worst_readings_found_by_a_search"),
+    ("release", "ticks_begin_within_the_bound_after"),
+    ("stuck-sensors", "a_stuck_sensor_does_what_the_page_says"),
+    ("control-rates", "a_board_accepts_the_control_rates_that"),
 ];
+
+/// The tests among which these are. Of the whole workspace: a package by itself would be compiled with other features, and
+/// its dependencies again.
+const TESTS: [&str; 3] = ["--workspace", "--test", "it"];
+
+/// The test that writes the figures of `docs/measured/` into the pages.
+const PAGES: &str = "generated_parts_and_measured_figures_are_up_to_date";
 
 /// The chore that measures times beside those of others.
 const BENCH: &str = "bench";
@@ -138,14 +130,6 @@ pub fn run(arguments: &MeasureArguments) -> Result<(), ChoreError> {
     if arguments.list || arguments.quick {
         return Ok(());
     }
-    let update = [
-        "test",
-        "--profile",
-        "verify",
-        "--package",
-        "painleve-plant",
-        "documentation",
-    ];
     if is_named("figures") {
         for figure in FIGURES {
             let arguments: Vec<&str> = figure.split(' ').collect();
@@ -153,13 +137,19 @@ pub fn run(arguments: &MeasureArguments) -> Result<(), ChoreError> {
         }
     }
     let environment = [("UPDATE_DOCUMENTATION", "1")];
-    for (_, package, test) in BLOCKS.iter().filter(|(name, ..)| is_named(name)) {
-        run_tests(&["--package", package], &[test], &[], &environment)?;
+    for (_, test) in BLOCKS.iter().filter(|(name, _)| is_named(name)) {
+        run_tests(&TESTS, &[test], &[], &environment)?;
     }
     if is_named(BENCH) {
         run_with(&cargo(), &["xtask", BENCH], &environment)?;
     }
-    run_with(&cargo(), &update, &environment)
+    // Not with `run_tests`: this needs no image, and so no compiler for boards.
+    let test = ["test", "--profile", PROFILE];
+    run_with(
+        &cargo(),
+        &[&test[..], &TESTS, &["--", PAGES]].concat(),
+        &environment,
+    )
 }
 
 fn read_files() -> Result<Vec<Measured>, ChoreError> {
@@ -188,7 +178,7 @@ fn read_files() -> Result<Vec<Measured>, ChoreError> {
 }
 
 fn check_names(names: &[String], files: &[Measured]) -> Result<(), ChoreError> {
-    let mut known: Vec<String> = BLOCKS.iter().map(|(name, ..)| (*name).into()).collect();
+    let mut known: Vec<String> = BLOCKS.iter().map(|(name, _)| (*name).into()).collect();
     known.extend([BENCH.into(), "figures".into()]);
     for file in files {
         for place in 0..file.entries()?.len() {
