@@ -14,6 +14,7 @@ use std::path::{Path, PathBuf};
 
 use painleve_files::atomic_file;
 use painleve_firmware::SOURCES;
+use painleve_plant::scenario::describe;
 use painleve_shared::frame::StatusFlags;
 use painleve_shared::lapse::Lapse;
 use painleve_shared::status::Fault;
@@ -53,6 +54,30 @@ fn check(page: &str, name: &str, expected: &str) {
     }
     panic!(
         "docs/{page}: the part '{name}' is not up to date; update it with:\n\
+         UPDATE_DOCUMENTATION=1 cargo test -p painleve-plant documentation"
+    );
+}
+
+/// The list that `painleve scenarios --keys` prints, for readers without the program. It also shows, in a review, each default
+/// and range that a change of the source moves.
+#[test]
+fn the_list_of_settings_is_up_to_date() {
+    let mut list = csv::Writer::from_writer(Vec::new());
+    list.write_record(["key", "kinds", "default", "allowed", "meaning"])
+        .unwrap();
+    for it in describe::settings() {
+        let kinds = it.kinds.join(" ");
+        list.write_record([it.key, kinds, it.default, it.allowed, it.meaning])
+            .unwrap();
+    }
+    let expected = String::from_utf8(list.into_inner().unwrap()).unwrap();
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/settings.csv");
+    if std::env::var_os("UPDATE_DOCUMENTATION").is_some() {
+        atomic_file::write(&path, expected.as_bytes()).unwrap();
+    }
+    assert!(
+        fs::read_to_string(path).unwrap_or_default() == expected,
+        "docs/settings.csv is not up to date; update it with:\n\
          UPDATE_DOCUMENTATION=1 cargo test -p painleve-plant documentation"
     );
 }
