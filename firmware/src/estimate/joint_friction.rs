@@ -85,6 +85,9 @@ mod tests {
         assert_eq!(friction_nm(0.5198), forward);
         let reversed = friction_nm(0.5188);
         assert!((reversed + 0.085).abs() < 1e-4, "{reversed}");
+        // However far the joint turns in a tick, the friction is never more than that of sliding.
+        let far = friction_nm(0.5288);
+        assert!((far - 0.085).abs() < 1e-4, "{far}");
     }
 
     #[test]
