@@ -49,8 +49,11 @@ const BLOCKS: [(&str, &str); 6] = [
 /// its dependencies again.
 const TESTS: [&str; 3] = ["--workspace", "--test", "it"];
 
-/// The test that writes the figures of `docs/measured/` into the pages.
-const PAGES: &str = "generated_parts_and_measured_figures_are_up_to_date";
+/// The tests that write the figures of `docs/measured/` into the pages, and draw them.
+const PAGES: [&str; 2] = [
+    "generated_parts_and_measured_figures_are_up_to_date",
+    "documentation_draws_the_trade_off_as_measured",
+];
 
 /// The chore that measures times beside those of others.
 const BENCH: &str = "bench";
@@ -147,7 +150,7 @@ pub fn run(arguments: &MeasureArguments) -> Result<(), ChoreError> {
     let test = ["test", "--profile", PROFILE];
     run_with(
         &cargo(),
-        &[&test[..], &TESTS, &["--", PAGES]].concat(),
+        &[&test[..], &TESTS, &["--"], &PAGES].concat(),
         &environment,
     )
 }
