@@ -7,6 +7,9 @@ const TICK_S: f32 = 1e-3;
 const P_PER_KG: f32 = 2.4;
 const P_RATIO: f32 = 0.09;
 
+/// Force that a torque stage of 12 bits withholds by rounding, N.
+const ROUNDING_N: f32 = 0.05;
+
 fn estimator() -> ResponseEstimator {
     ResponseEstimator::new(&ResponseSettings::default(), TICK_S)
 }
@@ -14,16 +17,18 @@ fn estimator() -> ResponseEstimator {
 /// Returns the response after `ticks` of a contact that gives the force (N) in
 /// answer to the force commanded at the previous tick.
 fn observed(ticks: u32, contact: impl FnMut(f32) -> f32) -> ContactResponse {
-    observed_after(|_| 1, ticks, contact)
+    observed_by(estimator(), ROUNDING_N, |_| 1, ticks, contact)
 }
 
-/// The same with readings that follow the previous ones after these ticks.
-fn observed_after(
+/// The same by an estimator, with torques rounded by this force and readings that follow the previous ones after these
+/// ticks.
+fn observed_by(
+    mut estimator: ResponseEstimator,
+    rounding_n: f32,
     elapsed_ticks: impl Fn(u32) -> u32,
     ticks: u32,
     mut contact: impl FnMut(f32) -> f32,
 ) -> ContactResponse {
-    let mut estimator = estimator();
     // The probe of a tick is drawn after the tick before.
     let (mut withheld, mut probe_n, mut commanded) = (0.0, 0.0, 10.0);
     for tick in 0..ticks {
@@ -34,7 +39,7 @@ fn observed_after(
             1 => estimator.bound(),
             _ => {}
         }
-        let next = 0.05 * noise(3 * tick + 1);
+        let next = rounding_n * noise(3 * tick + 1);
         commanded = 10.0 + next - withheld + probe_n;
         (withheld, probe_n) = (next, estimator.probe_n);
     }
@@ -104,7 +109,7 @@ fn a_contact_certainly_lags_even_if_its_force_swings() {
 fn a_rigid_contact_is_found_even_if_readings_are_lost() {
     let mut tick = 0;
     let elapsed_ticks = |tick| if tick % 10 == 0 { 3 } else { 1 };
-    let found = observed_after(elapsed_ticks, 1500, |commanded| {
+    let found = observed_by(estimator(), ROUNDING_N, elapsed_ticks, 1500, |commanded| {
         let drift_n = noise(tick / 10);
         tick += 1;
         commanded + drift_n
@@ -180,4 +185,28 @@ fn after_a_pause_the_contact_settles_before_the_next_probe() {
     let ticks = ticks_until_probe(&mut state);
     let settling = SETTLING_S / TICK_S;
     assert!((f32::from(ticks) - settling).abs() <= 1.0, "{ticks}");
+}
+
+/// The rounding of a torque stage of 20 bits shows nothing below the noise of the force cell.
+#[test]
+fn behind_a_fine_torque_stage_only_the_probe_finds_a_rigid_contact() {
+    let share = |probe_n: f32| {
+        let settings = ResponseSettings {
+            probe_n,
+            ..Default::default()
+        };
+        let estimator = ResponseEstimator::new(&settings, TICK_S);
+        observed_by(
+            estimator,
+            ROUNDING_N / 256.0,
+            |_| 1,
+            1500,
+            |force_n| force_n,
+        )
+        .loop_share
+    };
+    let rigid = ContactResponse::rigid(P_RATIO).loop_share;
+    assert_eq!(share(ResponseSettings::default().probe_n), rigid);
+    let least_of_rigid = share(0.0) / rigid;
+    assert!(least_of_rigid < 0.1, "{least_of_rigid}");
 }
