@@ -49,10 +49,11 @@ const BLOCKS: [(&str, &str); 6] = [
 /// its dependencies again.
 const TESTS: [&str; 3] = ["--workspace", "--test", "it"];
 
-/// The tests that write the figures of `docs/measured/` into the pages, and draw them.
-const PAGES: [&str; 2] = [
+/// The tests that write the figures of `docs/measured/` into the pages, draw them, and list the settings.
+const PAGES: [&str; 3] = [
     "generated_parts_and_measured_figures_are_up_to_date",
     "documentation_draws_the_trade_off_as_measured",
+    "the_list_of_settings_is_up_to_date",
 ];
 
 /// The chore that measures times beside those of others.
