@@ -12,10 +12,13 @@ use painleve_files::atomic_file;
 
 use crate::documentation::{Entry, entries, number};
 
+/// Returns the torque noise of an entry, mN·m a tick.
+fn noise_mnm(entry: &Entry) -> f64 {
+    1e3 * figure(entry, "torque change, holding, 90th percentile, N·m a tick")
+}
+
 /// Returns a panel of a figure of merit against the torque noise: value, lower and upper end for each entry.
 fn panel(title: &str, entries: &[Entry], value: impl Fn(&Entry) -> [f64; 3]) -> Panel {
-    let noise_mnm =
-        |entry: &Entry| 1e3 * figure(entry, "torque change, holding, 90th percentile, N·m a tick");
     let intervals = entries.iter().flat_map(|entry| {
         let (x, [_, low, high]) = (noise_mnm(entry), value(entry));
         [(x, low), (x, high), (f64::NAN, f64::NAN)]
@@ -67,11 +70,15 @@ fn documentation_draws_the_trade_off_as_measured() {
     let error = panel("Error, 95th percentile (mm)", &entries, |entry| {
         [1e3 * figure(entry, "error, 95th percentile, m"); 3]
     });
+    let [least, most] =
+        [f64::min, f64::max].map(|of| entries.iter().map(noise_mnm).reduce(of).unwrap());
+    // With room for the labels.
+    let margin = 0.1 * (most - least);
     let chart = Chart {
         title: "Success and error against torque noise".into(),
         subtitle: "Labels: bandwidth relative to the default; bars: 95 % intervals".into(),
         x_title: "Torque change a tick while holding, 90th percentile (mN·m)".into(),
-        x: Some(55.0..135.0),
+        x: Some(least - margin..most + margin),
         panels: vec![success, error],
         one_legend: true,
         ..Chart::default()
