@@ -6,6 +6,7 @@ use painleve_plant::scenario::{Scenario, built_in, describe};
 use painleve_process::terminal;
 use serde_json::{Value, json};
 
+use super::json::JsonOption;
 use super::output_error::{InputError, output};
 use super::{CommandError, say};
 
@@ -57,7 +58,12 @@ pub fn run(arguments: &ScenariosArguments) -> Result<(), CommandError> {
         return say(format!("{:#}", describe::json_schema()));
     }
     if let Some(part) = &arguments.keys {
-        return list_keys(part, arguments.json);
+        return list_keys(
+            part,
+            JsonOption {
+                json: arguments.json,
+            },
+        );
     }
     let load = |name| Scenario::load(name, &[]).map(|scenario| (name, scenario.description));
     let scenarios: Vec<_> = built_in::names().map(load).collect::<Result<_, _>>()?;
@@ -72,14 +78,11 @@ pub fn run(arguments: &ScenariosArguments) -> Result<(), CommandError> {
     say(terminal::readable_table(table))
 }
 
-fn list_keys(part: &str, as_json: bool) -> Result<(), CommandError> {
+fn list_keys(part: &str, json: JsonOption) -> Result<(), CommandError> {
     let mut settings = describe::settings();
     settings.retain(|setting| setting.key.contains(part));
     if settings.is_empty() {
         return Err(InputError::NoKey(part.into()).into());
-    }
-    if as_json {
-        return say(serde_json::to_string(&settings).map_err(output)?);
     }
     let mut table = terminal::table(["key", "default", "allowed", "meaning"]);
     for setting in &settings {
@@ -89,5 +92,5 @@ fn list_keys(part: &str, as_json: bool) -> Result<(), CommandError> {
         };
         table.add_row([&key, &setting.default, &setting.allowed, &setting.meaning]);
     }
-    say(terminal::readable_table(table))
+    json.say(&settings, terminal::readable_table(table))
 }

@@ -58,6 +58,21 @@ fn check(page: &str, name: &str, expected: &str) {
     );
 }
 
+/// Compares a whole file of `docs/` with its expected text, or writes it if `UPDATE_DOCUMENTATION` is set.
+pub fn check_file(name: &str, expected: &str) {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("../../docs")
+        .join(name);
+    if std::env::var_os("UPDATE_DOCUMENTATION").is_some() {
+        atomic_file::write(&path, expected.as_bytes()).unwrap();
+    }
+    assert!(
+        fs::read_to_string(path).is_ok_and(|present| present == expected),
+        "docs/{name} is not up to date; update it with:\n\
+         UPDATE_DOCUMENTATION=1 cargo test -p painleve-plant documentation"
+    );
+}
+
 /// The list that `painleve scenarios --keys` prints, for readers without the program. It also shows, in a review, each default
 /// and range that a change of the source moves.
 #[test]
@@ -71,15 +86,7 @@ fn the_list_of_settings_is_up_to_date() {
             .unwrap();
     }
     let expected = String::from_utf8(list.into_inner().unwrap()).unwrap();
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/settings.csv");
-    if std::env::var_os("UPDATE_DOCUMENTATION").is_some() {
-        atomic_file::write(&path, expected.as_bytes()).unwrap();
-    }
-    assert!(
-        fs::read_to_string(path).unwrap_or_default() == expected,
-        "docs/settings.csv is not up to date; update it with:\n\
-         UPDATE_DOCUMENTATION=1 cargo test -p painleve-plant documentation"
-    );
+    check_file("settings.csv", &expected);
 }
 
 /// One test for all parts, so that two parts of one page are not written at the same time.

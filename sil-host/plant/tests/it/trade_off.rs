@@ -2,15 +2,11 @@
 
 #![allow(clippy::unwrap_used)]
 
-use std::fs;
-use std::path::Path;
-
 use painleve_chart::Mark;
 use painleve_chart::chart::{Chart, Panel};
 use painleve_chart::style::{BLUE_INK, Colour, VERMILLION};
-use painleve_files::atomic_file;
 
-use crate::documentation::{Entry, entries, number};
+use crate::documentation::{Entry, check_file, entries, number};
 
 /// Returns the torque noise of an entry, mN·m a tick.
 fn noise_mnm(entry: &Entry) -> f64 {
@@ -83,14 +79,5 @@ fn documentation_draws_the_trade_off_as_measured() {
         one_legend: true,
         ..Chart::default()
     };
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/images/smoothness.svg");
-    let expected = chart.svg();
-    if std::env::var_os("UPDATE_DOCUMENTATION").is_some() {
-        atomic_file::write(&path, expected.as_bytes()).unwrap();
-    }
-    assert!(
-        fs::read_to_string(&path).is_ok_and(|present| present == expected),
-        "docs/images/smoothness.svg does not show docs/measured/smoothness.toml; draw it again with:\n\
-         UPDATE_DOCUMENTATION=1 cargo test -p painleve-plant documentation"
-    );
+    check_file("images/smoothness.svg", &chart.svg());
 }

@@ -115,13 +115,13 @@ impl List {
             allowed: allowed.into(),
             meaning: meaning.into(),
         };
-        let kinds = self.kinds.iter().map(ToString::to_string).collect();
+        let kinds: Vec<_> = self.kinds.iter().map(ToString::to_string).collect();
         let is_same = |other: &&mut Setting| {
             (&other.key, &other.default, &other.allowed, &other.meaning)
                 == (&row.key, &row.default, &row.allowed, &row.meaning)
         };
         match self.rows.iter_mut().find(is_same) {
-            Some(other) => other.kinds.extend::<Vec<_>>(kinds),
+            Some(other) => other.kinds.extend(kinds),
             None => self.rows.push(Setting { kinds, ..row }),
         }
     }
