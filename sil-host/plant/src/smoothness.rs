@@ -87,15 +87,19 @@ impl Smoothness {
         }
     }
 
-    /// Adds a tick with the controller's answer, if it gave one, and the normal force at its end, N.
+    /// Adds a tick with the controller's answer, if it arrived, and the normal force at its end, N.
     #[inline]
     pub fn add(&mut self, answer: Option<&ActuatorFrame>, normal_force_n: f64) {
-        let tracking = Some(SupervisorState::Tracking);
-        let Some(answer) = answer.filter(|answer| answer.supervisor_state() == tracking) else {
+        let Some(answer) = answer else {
+            // A reference that stands does not move because a frame is lost.
+            self.last = None;
+            return;
+        };
+        if answer.supervisor_state() != Some(SupervisorState::Tracking) {
             self.last = None;
             self.rest_ticks = 0;
             return;
-        };
+        }
         let mut changes = [0; 2];
         if let Some((last, before)) = &self.last {
             for (joint, change) in changes.iter_mut().enumerate() {
@@ -147,6 +151,30 @@ mod tests {
         assert!((holding.torque_change_counts().unwrap() - 8.0_f64.sqrt()).abs() < 1e-9);
         assert!((holding.reversals().unwrap() - 0.5).abs() < 1e-3);
         assert!((holding.force_ripple_n().unwrap() - 2.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_reference_stands_across_lost_frames_and_not_across_another_state() {
+        let held = |last_state| {
+            let mut smoothness = Smoothness::new(1000.0);
+            for tick in 0..2000 {
+                let frame = answer([tick % 2, 0], 0);
+                smoothness.add((tick % 100 != 50).then_some(&frame), 10.0);
+            }
+            let before = smoothness.holding.ticks;
+            let frame = answer([0; 2], 0);
+            smoothness.add(last_state, 10.0);
+            for _ in 0..300 {
+                smoothness.add(Some(&frame), 10.0);
+            }
+            (before, smoothness.holding.ticks - before)
+        };
+        let mut retreating = answer([0; 2], 0);
+        retreating.state = SupervisorState::LiftOff as u8;
+        // Without the first tick, the 20 that are lost and the 20 after them; the reference settles for 500.
+        let standing = 2000 - 1 - 40 - 500;
+        assert_eq!(held(None), (standing, 299));
+        assert_eq!(held(Some(&retreating)), (standing, 0));
     }
 
     #[test]
