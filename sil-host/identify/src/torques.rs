@@ -6,7 +6,7 @@
 //!
 //! u − u_m = c sgn q̇ + δk (q − q₀) + b u_m + o,
 //!
-//! plus the effects of both force cells' gains and cross-talk and of the belt's tilt, which are the same for both joints.
+//! plus the effects of both force cells' gains, cross-talk and zeros and of the belt's tilt, which are the same for both joints.
 //! Least squares determine all of these, with what is known beforehand. A stage gives 1/(1 + b) times the commanded torque;
 //! that differs little from the gains of the force cells, and its deviation says so. Friction and stiffness are in commanded
 //! torque, as the controller needs them, so that this does not matter to them. u itself is no regressor: with its noise, the
@@ -40,10 +40,11 @@ const LEAST_SHARE: f64 = 0.1;
 const BACK_S: f64 = 8e-3;
 
 /// Standard deviations known beforehand: gain of a stage, stiffness relative to the scenario's, gain and cross-talk of the force
-/// cells, and tilt of the belt, rad.
+/// cells, their readings without a force, N, which drift after they were measured, and tilt of the belt, rad.
 const GAIN: f64 = 0.1;
 const STIFFNESS: f64 = 0.15;
 const CELL: f64 = 0.05;
+const ZERO_N: f64 = 0.2;
 const TILT_RAD: f64 = 0.04;
 
 /// Part of a result that is always assumed to be wrong: at the low speed of a slide, friction is a little more than Coulomb's.
@@ -53,7 +54,7 @@ const ALWAYS: f64 = 0.02;
 const ALWAYS_OFFSET: f64 = 0.005;
 
 /// Error of a force cell's gain and cross-talk that is always assumed: they share a scale with the gains of the stages, and
-/// slides hardly tell them from the belt's tilt. The errors of sixty simulated arms have a root mean square of 0.004 to 0.014.
+/// slides hardly tell them from the belt's tilt. The errors of sixty simulated arms have a root mean square of 0.003 to 0.019.
 const ALWAYS_CELL: f64 = 0.012;
 
 /// Change of the tilt for its derivative, rad.
@@ -62,8 +63,8 @@ const TILTED_RAD: f64 = 1e-4;
 /// Rounds in which the noise is estimated.
 const ROUNDS: usize = 4;
 
-/// Number of unknowns: four of each joint, four of the force cells, the tilt.
-const COUNT: usize = 13;
+/// Number of unknowns: four of each joint, six of the force cells, the tilt.
+const COUNT: usize = 15;
 
 type Values = SVector<f64, COUNT>;
 
@@ -75,10 +76,11 @@ const OFFSET: usize = 3;
 const OF_JOINT: usize = 4;
 
 /// Index of the part of the readings of f_t and f_n that is none of the force, of f_n's in that of f_t, of f_t's in that of
-/// f_n, and of the tilt.
+/// f_n, of what the readings of f_t and f_n have in addition, N, and of the tilt.
 const CELLS: usize = 2 * OF_JOINT;
 const INTO_T: usize = CELLS + 2;
 const INTO_N: usize = CELLS + 3;
+const ZEROS: usize = CELLS + 4;
 const BELT: usize = COUNT - 1;
 
 /// A value with its standard deviation.
@@ -135,6 +137,8 @@ pub struct Cell {
     pub gain: Estimate,
     /// Share of the other force that the reading contains.
     pub cross_talk: Estimate,
+    /// Reading without a force, N.
+    pub zero_n: Estimate,
 }
 
 /// What the slides show of both joints and of the force cells.
@@ -188,15 +192,17 @@ impl Joints {
             let means: Vec<Mean> = stretches(&slide.readings, ticks as u32)
                 .filter_map(|(number, readings)| Mean::of(number, readings, geometry, limits))
                 .collect();
+            let mut force_n = Vector2::zeros();
             for mean in &means {
                 square += mean.torque_nm.norm_squared();
                 count += 2.0;
+                force_n += mean.force_n / means.len() as f64;
             }
             for window in means.windows(3) {
                 if let [before, now, after] = window
                     && after.number == before.number.wrapping_add(2)
                 {
-                    equations.extend(model.equations(before, now, after));
+                    equations.extend(model.equations(before, now, after, force_n));
                 }
             }
         }
@@ -210,6 +216,8 @@ impl Joints {
             deviations[own + STAGE] = GAIN;
             deviations[own + OFFSET] = torque_nm;
         }
+        deviations[ZEROS] = ZERO_N;
+        deviations[ZEROS + 1] = ZERO_N;
         deviations[BELT] = TILT_RAD;
         Ok(Self::fitted(&equations, &deviations, known))
     }
@@ -295,8 +303,8 @@ impl Solution {
         solution
     }
 
-    /// Returns the force cells: with readings r = (1 + E) f, the part A of the readings that is none of the force is
-    /// 1 − (1 + E)⁻¹.
+    /// Returns the force cells: with readings r = (1 + E) f + r₀, the part A of the readings that is none of the force is
+    /// 1 − (1 + E)⁻¹, and (1 + E)⁻¹ r₀ comes in addition.
     fn cells(&self) -> [Cell; 2] {
         let part = |index: usize| self.unknowns[index];
         let force = Matrix2::new(
@@ -306,13 +314,19 @@ impl Solution {
             1.0 - part(CELLS + 1),
         );
         let reading = force.try_inverse().unwrap_or_default();
+        let zeros_n = reading * Vector2::new(part(ZEROS), part(ZEROS + 1));
+        let deviation = |index: usize| self.sum(&self.unit(index)).deviation;
         let of = |value: f64, index: usize| Estimate {
             value,
-            deviation: libm::hypot(self.sum(&self.unit(index)).deviation, ALWAYS_CELL),
+            deviation: libm::hypot(deviation(index), ALWAYS_CELL),
         };
         [(0, INTO_T), (1, INTO_N)].map(|(cell, into)| Cell {
             gain: of(reading[(cell, cell)], CELLS + cell),
             cross_talk: of(reading[(cell, 1 - cell)], into),
+            zero_n: Estimate {
+                value: zeros_n[cell],
+                deviation: deviation(ZEROS + cell),
+            },
         })
     }
 
@@ -431,8 +445,14 @@ impl Model {
         })
     }
 
-    /// Returns the equations of the joints that turn.
-    fn equations(&self, before: &Mean, now: &Mean, after: &Mean) -> impl Iterator<Item = Equation> {
+    /// Returns the equations of the joints that turn, in a slide with this mean force.
+    fn equations(
+        &self,
+        before: &Mean,
+        now: &Mean,
+        after: &Mean,
+        slide_n: Vector2<f64>,
+    ) -> impl Iterator<Item = Equation> {
         let links = |joints: Vector2<f64>| JointMotion::from_vector(joints).to_links();
         let turned_rad = after.joints_rad - before.joints_rad;
         let theta = links(now.joints_rad);
@@ -451,13 +471,21 @@ impl Model {
             let force_n = Vector2::new(along_n, off_n);
             GeneralisedTorque::from_vector(jacobian.transpose() * force_n).to_joints()
         };
-        let [along_n, off_n] = now.force_n.into();
-        let model_nm = moving_nm.to_joints().vector() - held_nm(along_n, off_n).vector();
+        let without_nm = |force_n: Vector2<f64>| {
+            moving_nm.to_joints().vector() - held_nm(force_n.x, force_n.y).vector()
+        };
+        let model_nm = without_nm(now.force_n);
+        // The force of a single time is no regressor, as the torque is none: what its readings are wrong by would pass for a part
+        // of them.
+        let even_nm = without_nm(slide_n);
+        let [along_n, off_n] = slide_n.into();
         let common = [
             held_nm(along_n, 0.0),
             held_nm(0.0, off_n),
             held_nm(off_n, 0.0),
             held_nm(0.0, along_n),
+            held_nm(1.0, 0.0),
+            held_nm(0.0, 1.0),
             tilted_nm.map(|nm| nm / TILTED_RAD).to_joints(),
         ];
         let halves_rad = [
@@ -477,7 +505,7 @@ impl Model {
                 let own = OF_JOINT * joint;
                 by[own + FRICTION] = turned_rad[joint].signum();
                 by[own + SPRING] = now.joints_rad[joint] - rest_rad[joint];
-                by[own + STAGE] = model_nm[joint];
+                by[own + STAGE] = even_nm[joint];
                 by[own + OFFSET] = 1.0;
                 for (at, torque_nm) in common.iter().enumerate() {
                     by[CELLS + at] = torque_nm.vector()[joint];

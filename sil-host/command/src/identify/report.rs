@@ -72,7 +72,13 @@ pub fn json(found: &Found) -> Value {
         })
     });
     let of = |it: Estimate| json!({ "value": it.value, "deviation": it.deviation });
-    let of_cell = |cell: Cell| json!({ "gain": of(cell.gain), "cross_talk": of(cell.cross_talk) });
+    let of_cell = |cell: Cell| {
+        json!({
+            "gain": of(cell.gain),
+            "cross_talk": of(cell.cross_talk),
+            "zero_n": of(cell.zero_n),
+        })
+    };
     let of_joint = |joint: Joint| {
         json!({
             "coulomb_friction_nm": of(joint.friction_nm),
@@ -211,16 +217,17 @@ fn joints(found: &Found) -> Table {
 /// Returns what the torques show of the force cells. No setting takes it: it is for information.
 fn cells(found: &Found) -> Table {
     type Of = fn(&Cell) -> Estimate;
-    let rows: [(&str, Of); 2] = [
-        ("reading to force", |it| it.gain),
-        ("share of the other force", |it| it.cross_talk),
+    let rows: [(&str, Of, usize, &str); 3] = [
+        ("reading to force", |it| it.gain, 3, ""),
+        ("share of the other force", |it| it.cross_talk, 3, ""),
+        ("reading without a force", |it| it.zero_n, 2, "N"),
     ];
-    let rows = rows.map(|(name, of)| {
+    let rows = rows.map(|(name, of, digits, unit)| {
         let [along, normal] = found.joints.cells.map(|cell| {
             let Estimate { value, deviation } = of(&cell);
-            spread(value, deviation, 3)
+            spread(value, deviation, digits)
         });
-        [name.into(), along, normal, String::new()]
+        [name.into(), along, normal, unit.into()]
     });
     Table {
         header: ["", "along the belt", "normal force", "unit"],
