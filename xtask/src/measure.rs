@@ -402,6 +402,7 @@ mod tests {
         ("effects-rigid", "the lab book"),
         ("effects-compliant", "the lab book"),
         ("arm", "by hand"),
+        ("commissioning", "by hand"),
         ("tick", "by hand"),
         ("wiring", "by hand"),
         ("wiring-bare-board", "by hand"),
