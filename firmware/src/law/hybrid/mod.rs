@@ -12,7 +12,7 @@
 //! without knowledge of μ. Near the edge, p → 0, even that pole is too fast for the sampling. By
 //! default the law therefore feeds the estimated friction −μ̂ s α_f forward, which closes no loop,
 //! and low-passes only the difference to the measured f_t, with a gain that falls with p (see
-//! [`FrictionFeedForward::Observed`]).
+//! [`FrictionFeedForward::Observed`]). In stick it feeds the measured f_t itself forward.
 
 mod allocation;
 mod settings;
@@ -90,8 +90,7 @@ impl Law for HybridSettings {
     fn tick(&self, state: &mut HybridState, input: &LawInput<'_>) -> LawOutput {
         let tangential_acceleration = self.commanded_acceleration_m_s2(state, input);
         let normal_force = self.commanded_force_n(state, input);
-        let friction_force =
-            self.compensated_friction_n(state, input, normal_force, tangential_acceleration);
+        let friction_force = self.compensated_friction_n(state, input, normal_force);
         let force_drift = self.force_drift_m_s2(state, input);
         let acceleration = input
             .model
@@ -187,27 +186,23 @@ impl HybridSettings {
         wanted_n + state.force_integral_n - damping_n + response.probe_n
     }
 
-    /// Returns the f_t to feed forward, N, for α_f (N) and α_v (m/s²).
+    /// Returns the f_t to feed forward, N, for α_f (N).
     fn compensated_friction_n(
         &self,
         state: &mut HybridState,
         input: &LawInput<'_>,
         normal_force_n: f32,
-        tangential_acceleration_m_s2: f32,
     ) -> f32 {
         match self.friction {
             FrictionFeedForward::Measured => input.contact.force_n.x,
+            // A reading in stick closes no loop through p: fed forward, it follows the wanted motion to the edge of the cone,
+            // where the tip breaks away without a jerk.
+            FrictionFeedForward::Observed { .. } if input.contact.friction.sticks => {
+                input.contact.force_n.x
+            }
             FrictionFeedForward::Observed { time_constant_s } => {
                 let friction = &input.contact.friction;
-                // In stick the friction force follows the feed-forward. Feeding forward the friction
-                // of the desired slip brings it to the edge of its cone, where the tip breaks away
-                // without a jerk.
-                let slip = if friction.sticks {
-                    Slip::of(tangential_acceleration_m_s2)
-                } else {
-                    friction.slip
-                };
-                let slip = friction.slip_seen.then_some(slip);
+                let slip = friction.slip_seen.then_some(friction.slip);
                 // A rigid contact would follow the excess at once.
                 let lags = input.contact.response.lags > 0.0;
                 let catch_up = if lags { friction.catch_up } else { 0.0 };

@@ -156,6 +156,31 @@ impl Sliding {
 }
 
 #[test]
+fn the_friction_of_a_tip_that_sticks_is_fed_forward_as_it_is_whatever_motion_is_wanted() {
+    for ahead_m in [-0.002, 0.0, 0.002] {
+        let mut tip = Sliding::new();
+        tip.ahead_m = ahead_m;
+        tip.tick();
+        tip.contact.friction.sticks = true;
+        for friction_n in [4.0, -5.0] {
+            tip.contact.force_n.x = friction_n;
+            tip.tick();
+            assert_eq!(tip.state.fed_force_n.x, friction_n);
+        }
+        // Once it slides, the edge of the cone is.
+        tip.contact.friction.sticks = false;
+        tip.contact.force_n = tip.state.fed_force_n;
+        tip.contact.force_n.x = -FRICTION * tip.contact.force_n.y;
+        tip.tick();
+        let [along_n, off_n] = tip.state.fed_force_n.into();
+        assert!(
+            (along_n + FRICTION * off_n).abs() < 1e-3,
+            "{along_n} {off_n}"
+        );
+    }
+}
+
+#[test]
 fn a_contact_force_that_was_not_fed_forward_is_cancelled_along_the_belt() {
     let mut tip = Sliding::new();
     let rest_n = Vector2::new(-0.3, 0.5);
