@@ -391,7 +391,7 @@ mod tests {
     }
 
     /// Pictures that `figures` does not draw, and where they come from.
-    const OTHER_PICTURES: [(&str, &str); 11] = [
+    const OTHER_PICTURES: [(&str, &str); 12] = [
         ("smoothness", "a test draws it from docs/measured"),
         (
             "work-precision",
