@@ -10,7 +10,8 @@
 //! Least squares determine all of these, with what is known beforehand. A stage gives 1/(1 + b) times the commanded torque;
 //! that differs little from the gains of the force cells, and its deviation says so. Friction and stiffness are in commanded
 //! torque, as the controller needs them, so that this does not matter to them. u itself is no regressor: with its noise, the
-//! sum of squares would be least for torques that are too small.
+//! sum of squares would be least for torques that are too small. Nor is the force of a single time, whose noise would pass for a
+//! part of the reading: the factors of b and of the cells take the slide's mean force.
 
 use nalgebra::{Matrix2, SMatrix, SVector, Vector2};
 use painleve_shared::{
@@ -471,14 +472,10 @@ impl Model {
             let force_n = Vector2::new(along_n, off_n);
             GeneralisedTorque::from_vector(jacobian.transpose() * force_n).to_joints()
         };
-        let without_nm = |force_n: Vector2<f64>| {
-            moving_nm.to_joints().vector() - held_nm(force_n.x, force_n.y).vector()
-        };
-        let model_nm = without_nm(now.force_n);
-        // The force of a single time is no regressor, as the torque is none: what its readings are wrong by would pass for a part
-        // of them.
-        let even_nm = without_nm(slide_n);
+        let moving_nm = moving_nm.to_joints();
+        let model_nm = moving_nm.vector() - held_nm(now.force_n.x, now.force_n.y).vector();
         let [along_n, off_n] = slide_n.into();
+        let model_evenly_nm = moving_nm.vector() - held_nm(along_n, off_n).vector();
         let common = [
             held_nm(along_n, 0.0),
             held_nm(0.0, off_n),
@@ -505,7 +502,7 @@ impl Model {
                 let own = OF_JOINT * joint;
                 by[own + FRICTION] = turned_rad[joint].signum();
                 by[own + SPRING] = now.joints_rad[joint] - rest_rad[joint];
-                by[own + STAGE] = even_nm[joint];
+                by[own + STAGE] = model_evenly_nm[joint];
                 by[own + OFFSET] = 1.0;
                 for (at, torque_nm) in common.iter().enumerate() {
                     by[CELLS + at] = torque_nm.vector()[joint];
