@@ -6,7 +6,7 @@ use super::friction::FrictionEstimate;
 use super::response::ContactResponse;
 
 /// The contact estimate at a tick, for the posture predicted for it: contact and force from its readings, and in contact
-/// friction and p; the rest from the readings before.
+/// friction and p.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct ContactEstimate {
     /// Whether the tip touches.
@@ -23,8 +23,6 @@ pub struct ContactEstimate {
     pub friction: FrictionEstimate,
     /// p with that friction, 1/kg.
     pub p_per_kg: f32,
-    /// p/Q22 before the tick's readings, as the response assumes.
-    pub p_ratio: f32,
-    /// What the contact's response to torque allows.
+    /// What the contact's response to torque allows, from the readings before.
     pub response: ContactResponse,
 }

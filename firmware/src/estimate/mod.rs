@@ -288,7 +288,6 @@ impl Estimators {
         let p_ratio = p_per_kg / model.q22_per_kg;
         let response = self.response.response(p_per_kg, p_ratio);
         contact.p_per_kg = p_per_kg;
-        contact.p_ratio = p_ratio;
         contact.response = response;
     }
 
@@ -296,7 +295,8 @@ impl Estimators {
     #[inline(never)]
     fn balance_torques(&mut self) {
         let contact = &self.contact;
-        let p_ratio = contact.touches.then_some(contact.p_ratio);
+        let p_ratio = contact.p_per_kg / self.model.q22_per_kg;
+        let p_ratio = contact.touches.then_some(p_ratio);
         let loop_share = contact.response.loop_share;
         self.disturbance.update(&self.model, p_ratio, loop_share);
     }
