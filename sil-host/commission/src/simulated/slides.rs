@@ -55,6 +55,10 @@ const FRAME_M: f64 = 4e-3;
 /// Slip of the magnet, rad.
 const SLIP_RAD: f64 = 0.0105;
 
+/// Time for which the tip rests on the belt before the drive is switched on, s. A simulated arm starts with a tip that does not
+/// press yet: its weight makes the contact ring for some 25 ms.
+const RESTS_S: f64 = 0.05;
+
 /// Makes the plant of a scenario in its initial state.
 pub type PlantOf<P> = fn(&Scenario) -> Result<P, OutOfRange>;
 
@@ -178,6 +182,8 @@ impl<P: Plant> SlideRig for SimulatedSlides<P> {
             },
             run: RunSettings {
                 seed: scenario.run.seed.wrapping_add(u64::from(self.slides)),
+                enable_at_s: RESTS_S,
+                duration_s: scenario.run.duration_s + RESTS_S,
                 ..scenario.run
             },
             ..self.actual.clone()
