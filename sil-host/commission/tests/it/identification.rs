@@ -24,7 +24,7 @@ use painleve_plant::mechanics::motion::theta;
 use painleve_plant::scenario::Scenario;
 use painleve_shared::counts::{EncoderCounts, ForceCounts, TorqueCounts};
 use painleve_shared::frame::SensorFrame;
-use painleve_shared::{Arm, ArmParameters, Pose, Posture};
+use painleve_shared::{Arm, Pose, Posture};
 use painleve_study_core::case::{ControllerChoice, at_rest_on_belt};
 use painleve_study_quality::distribution::Percentiles;
 use painleve_study_quality::effects::{Contact, EffectsStudy};
@@ -455,8 +455,31 @@ fn joints_that_vibrate_do_not_pass_for_joints_with_less_friction() {
     assert!(rig.largest_force_n < 15.0, "{}", rig.largest_force_n);
 }
 
-fn judged(run: usize, scenario: &Scenario) -> Row {
-    robustness::run_on(BuiltInPlant::new(scenario).unwrap(), run, scenario).unwrap()
+/// Closed loops: all of them, and those set down where p is large enough.
+#[derive(Default)]
+struct Judged {
+    rows: Vec<Row>,
+    with_margin: Vec<Row>,
+}
+
+impl Judged {
+    /// Sets the tip down and runs a closed loop.
+    fn run(&mut self, run: usize, mut scenario: Scenario) {
+        let has_margin = set_down(&mut scenario, run);
+        let plant = BuiltInPlant::new(&scenario).unwrap();
+        let row = robustness::run_on(plant, run, &scenario).unwrap();
+        if has_margin {
+            self.with_margin.push(row.clone());
+        }
+        self.rows.push(row);
+    }
+
+    /// Prints the results; returns how many of those set down where p is large enough were kept, and the error of all.
+    fn describe(&self, name: &str) -> (Proportion, Percentiles) {
+        let large_p = format!("{name}, set down where p is large enough");
+        let (kept, _) = describe(&large_p, &self.with_margin);
+        (kept, describe(name, &self.rows).1)
+    }
 }
 
 /// Measures with all effects of a rig.
@@ -466,8 +489,8 @@ fn identified_arms_put_the_tip_where_they_say() {
     let arms = std::env::var("PAINLEVE_ARMS").map_or(10, |arms| arms.parse().unwrap());
     let study = loops(FIRST_SEED, LOOPS * arms);
     let cell = study.cells()[0];
-    let (mut drawn_margin, mut geometry) = (Vec::new(), Vec::new());
-    let (mut with, mut with_margin) = (Vec::new(), Vec::new());
+    let (mut by_plumb_line, mut careful) = (Judged::default(), Judged::default());
+    let mut identified_arms = Judged::default();
     let (mut refused, mut inside, mut parameters) = (Vec::new(), 0, 0);
     let (mut time_s, mut forces_n) = (0.0_f64, Vec::new());
     for arm in 0..arms {
@@ -480,29 +503,21 @@ fn identified_arms_put_the_tip_where_they_say() {
             let mut actual = imperfect(&study.scenario(cell, run).unwrap(), seed).unwrap();
             // It throws the tip.
             actual.effects.surface.seam_height_m = 0.0;
-            let mut careful = actual.clone();
-            let deviation_m = prior(&actual, &drawn()).tip_deviation_m();
-            careful.controller.estimator.tip_deviation_m = deviation_m as f32;
-            set_down(&mut careful, run);
-            drawn_margin.push(judged(run, &careful));
+            // As by a plumb line, and by a careful operator, whose zeros are within 1°.
+            for (part, judged) in [(1.0, &mut by_plumb_line), (1.0 / 3.0, &mut careful)] {
+                let mut told = actual.clone();
+                let zero_rad = &mut told.converters.encoder.mounting_error_rad;
+                *zero_rad = zero_rad.map(|it| part * it);
+                let drawn = Drawn {
+                    zero_rad: part * drawn().zero_rad,
+                    ..drawn()
+                };
+                let deviation_m = prior(&actual, &drawn).tip_deviation_m();
+                told.controller.estimator.tip_deviation_m = deviation_m as f32;
+                judged.run(run, told);
+            }
             if let Ok(found) = &found {
-                let mut known = found.applied_to(&actual, "").unwrap();
-                let has_margin = set_down(&mut known, run);
-                let row = judged(run, &known);
-                if has_margin {
-                    with_margin.push(row.clone());
-                }
-                with.push(row);
-                let drawn_joints = ArmParameters {
-                    coulomb_friction_nm: actual.arm_model.unwrap().coulomb_friction_nm,
-                    stiffness_nm_rad: actual.arm_model.unwrap().stiffness_nm_rad,
-                    ..known.arm_model.unwrap()
-                };
-                let known = Scenario {
-                    arm_model: Some(drawn_joints),
-                    ..known
-                };
-                geometry.push(judged(run, &known));
+                identified_arms.run(run, found.applied_to(&actual, "").unwrap());
             }
         }
         match found {
@@ -518,10 +533,12 @@ fn identified_arms_put_the_tip_where_they_say() {
     println!("within 3 deviations: {inside} of {parameters}; {time_s:.0} s at most");
     forces_n.sort_by(f64::total_cmp);
     println!("largest force of each arm, N: {forces_n:.1?}");
-    let (_, before) = describe("not identified, margin of a drawing", &drawn_margin);
-    describe("identified, joints as drawn", &geometry);
-    let (_, after) = describe("identified", &with);
-    describe("identified, set down where p is large enough", &with_margin);
+    let (_, before) = by_plumb_line.describe("not identified, margin of a drawing");
+    careful.describe("not identified, zeros within 1°");
+    let (kept, after) = identified_arms.describe("identified");
+    assert!(refused.is_empty() && time_s <= 120.0);
+    assert!(100 * inside >= 99 * parameters, "{inside} of {parameters}");
+    assert!(kept.rate > 0.9, "{kept}");
     assert!(after.median < 0.2 * before.median, "{after:?} {before:?}");
 }
 
