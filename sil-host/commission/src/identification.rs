@@ -253,7 +253,6 @@ pub fn slide_scenario(
         law,
         reference,
         format!("run.duration_s={duration_s}"),
-        "run.enable_at_s=0.0".into(),
         format!("controller.governor.p_per_kg={LEAST_P_PER_KG:?}"),
         format!("belt.profile={{ kind = 'constant', speed_m_s = {speed_m_s:?} }}"),
     ];
