@@ -27,8 +27,8 @@ const DIFFERENT_SQUARE: f32 = 64.0;
 /// Fraction of the estimated friction that indicates a slip in the opposite direction.
 const REVERSAL_FRACTION: f32 = 0.8;
 
-/// Number of such ticks in a row that reverse the slip. Friction of a tip that bounces alternates: where one tick reversed the
-/// slip, thrown tips were led to the wrong stretch of the belt (lab book, *One contrary tick instead of three*).
+/// Number of such ticks in a row that reverse the slip. Friction of a tip that bounces alternates: with one tick, four
+/// more of 300 arms were thrown too fast to be identified (lab book, *One contrary tick instead of three*).
 const REVERSAL_TICKS: u8 = 3;
 
 /// Random walk of μ, 1/√s.
