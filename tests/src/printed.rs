@@ -68,6 +68,21 @@ pub fn check_row(page: &str, expected: &str) {
     }
 }
 
+/// Compares a figure of `docs/images/` with its expected text, or writes it if `UPDATE_DOCUMENTATION` is set.
+///
+/// # Panics
+/// If the figure is not up to date.
+pub fn check_figure(name: &str, expected: &str) {
+    let path = page_path("images").join(name);
+    if std::env::var_os("UPDATE_DOCUMENTATION").is_some() {
+        std::fs::write(&path, expected).unwrap_or_else(|error| panic!("{name}: {error}"));
+    }
+    assert!(
+        std::fs::read_to_string(&path).is_ok_and(|present| present == expected),
+        "docs/images/{name} is not up to date; {UPDATE}"
+    );
+}
+
 fn page_path(page: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR"))
         .join("../docs")

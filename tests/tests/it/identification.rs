@@ -5,6 +5,7 @@
 use painleve_commission::identification::{FORCE_N, slide_scenario};
 use painleve_plant::scenario::Scenario;
 use painleve_shared::Posture;
+use painleve_tests::printed::check_figure;
 use painleve_tests::{Bench, code, errors};
 use serde_json::Value;
 
@@ -37,10 +38,12 @@ fn a_rehearsal_writes_what_it_has_found() {
         "friction",
         "The arm's model explains",
         "Set the tip down here",
-        "</svg>",
     ] {
         assert!(page.contains(part), "{part}: {page}");
     }
+    let begin = page.find("<svg").unwrap();
+    let (figure, _) = page[begin..].split_once("</svg>").unwrap();
+    check_figure("identified.svg", &format!("{figure}</svg>\n"));
     for key in [
         "arm_model",
         "controller.estimator.encoders.zero_rad",
