@@ -8,7 +8,7 @@ use crate::last_command::LastCommand;
 use crate::refer::Target;
 use crate::supervise::supervisor::Supervisor;
 
-/// A snapshot for logs and displays. The controller only writes it.
+/// A snapshot for logs and displays. No part of the controller's behaviour depends on it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Telemetry {

@@ -55,8 +55,8 @@ macro_rules! lapses {
             /// for one lapse.
             ///
             /// One overrun may be a rare branch; two in a row mean that the processor is too slow.
-            /// At 1 kHz the arm moves at most 10 mm in 20 ms. A sensor whose answer was disturbed
-            /// recovers at the next tick, or is broken.
+            /// A sensor whose answer was disturbed recovers at the next tick, or is broken. In ten ticks of 1 kHz, a
+            /// tip at 0.5 m/s moves by 5 mm.
             #[derive(Copy, Eq)]
             pub struct LapseLimits {
                 $($(

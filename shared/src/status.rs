@@ -13,7 +13,7 @@ pub enum SupervisorState {
     /// Not enabled; torque is zero.
     #[default]
     Idle = 0,
-    /// Enabled; the arm holds its position until contact is confirmed.
+    /// Enabled; the arm holds its position, or returns a tip in the air to the belt, until contact is confirmed.
     Armed = 1,
     /// The arm follows the reference.
     Tracking = 2,

@@ -11,8 +11,8 @@
 //! Wittenmark, Computer-Controlled Systems, 3rd edition, chapter 9).
 //!
 //! Each stage holds its settings, which never change, and its state; the stages' signatures show the
-//! data flow between them. At the end of a tick its results are written to the telemetry, which is
-//! never read back.
+//! data flow between them. At the end of a tick its results are written to the telemetry, on which
+//! nothing depends.
 
 mod arrival;
 mod stages;

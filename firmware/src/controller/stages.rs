@@ -171,7 +171,7 @@ impl<L: Law> Stages<L> {
             estimates.learn_in_the_air(observed, turn);
         }
         // A tip that is being returned to the belt needs the edges soon.
-        if turn == Turn::Edges || (!touches && self.references.asks_for_landing()) {
+        if turn == Turn::Edges || (!touches && self.references.asks_for_landing) {
             self.references.search(estimates);
         }
     }

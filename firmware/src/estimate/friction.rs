@@ -11,8 +11,8 @@
 //! The estimated direction of slip reverses only on a friction force near the opposite side of the
 //! cone, because in stick the sign of the force carries no information.
 //!
-//! The gain of a Kalman filter is known before the reading. A tick therefore only corrects the estimate, with
-//! readings in newtons, whose noise does not depend on f_n; the variances are updated after the tick is answered.
+//! A tick only corrects the estimate, with readings in newtons, whose noise does not depend on f_n; the variances, which
+//! the next gain needs, are updated after the tick is answered.
 
 use nalgebra::Vector2;
 use painleve_shared::{Real, Slip, settings};

@@ -178,8 +178,10 @@ impl JointEstimator {
     fn predict_over(&mut self, acceleration_rad_s2: &JointMotion<f32>, ticks: u32) {
         let (limit, time_s) = (self.settings.rate_limit_rad_s, ticks as f32 * self.tick_s);
         self.predicted_ticks = self.predicted_ticks.saturating_add(ticks);
-        let before = self.rates_rad_s.map(|rate| rate.within(limit));
-        self.rates_rad_s = before + *acceleration_rad_s2 * time_s;
+        let before = self.rates_rad_s;
+        let after = before + *acceleration_rad_s2 * time_s;
+        // An acceleration that is wrong, as with gains too high for the control rate, drives no angle away.
+        self.rates_rad_s = after.map(|rate| rate.within(limit));
         self.angles_rad += (before + self.rates_rad_s) * 0.5 * time_s;
     }
 

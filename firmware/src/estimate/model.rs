@@ -111,7 +111,7 @@ impl Model {
 
     /// Moves the model to these link angles θ (rad) and rates θ̇ (rad/s) nearby, to first order: the tip, and everything that
     /// the inverse dynamics need. M⁻¹, Q, det J and the slope of the free normal acceleration stay those of the predicted
-    /// state, from which an encoder's count is a fraction of a milliradian away.
+    /// state, from which the readings are a count or so away.
     #[inline]
     pub fn move_to(
         &mut self,

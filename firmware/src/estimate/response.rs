@@ -76,7 +76,7 @@ impl ContactResponse {
     }
 }
 
-/// The estimator's settings.
+/// The estimator: its settings, and the sums over the ticks in contact.
 #[derive(Clone, Copy, Debug)]
 pub struct ResponseEstimator {
     settings: ResponseSettings,

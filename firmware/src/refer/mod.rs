@@ -41,10 +41,10 @@ pub struct References {
     governor: EdgeGovernor,
     /// Least p as a fraction of Q22 at which a recovered tip may land.
     landing_p_ratio: f32,
-    /// Posture in which the drive was armed or the tip landed.
+    /// Posture of the arm or, of a thrown one, that in which it is to land.
     posture: Posture,
-    /// Least p as a fraction of Q22 at which the tip may land; 0 if it is not being returned to the belt.
-    asked_p_ratio: f32,
+    /// Whether the edges depend on where a thrown tip may land.
+    pub asks_for_landing: bool,
     generator: ReferenceGenerator,
 }
 
@@ -58,7 +58,7 @@ impl References {
     ) -> Self {
         Self {
             posture: Posture::ElbowDown,
-            asked_p_ratio: 0.0,
+            asks_for_landing: false,
             governor,
             landing_p_ratio,
             generator,
@@ -84,14 +84,11 @@ impl References {
         let descends = contact.in_flight || landing.is_some();
         let drives = phase.state.drives();
         let recovering = drives && phase.recovers && !contact.touches && descends;
-        self.asked_p_ratio = if recovering || landing.is_some() {
-            self.landing_p_ratio
-        } else {
-            0.0
-        };
+        self.asks_for_landing = recovering || landing.is_some();
         let tip_t_m = model.tip_m.x;
-        // While the drive is off, the edges are searched for the posture in which it would be armed.
-        if phase.arms || !drives {
+        // While the drive is off, the edges are searched for the posture in which it would be armed; a thrown arm may land in
+        // another posture than it was to land in.
+        if contact.touches || !drives {
             self.posture = Posture::of(&model.theta_rad);
         } else if let Some(posture) = landing {
             self.posture = posture;
@@ -131,15 +128,19 @@ impl References {
             edges_for_landing: recovering
                 && self
                     .governor
-                    .has_edges_for(self.posture, self.asked_p_ratio),
+                    .has_edges_for(self.posture, self.asked_p_ratio()),
             at_edge: drives && !recovering && self.governor.is_at_edge(),
             recovering,
         }
     }
 
-    /// Returns whether the edges depend on where a thrown tip may land.
-    pub fn asks_for_landing(&self) -> bool {
-        self.asked_p_ratio > 0.0
+    /// Returns the least p, as a fraction of Q22, that is asked for beyond the governor's own.
+    fn asked_p_ratio(&self) -> f32 {
+        if self.asks_for_landing {
+            self.landing_p_ratio
+        } else {
+            0.0
+        }
     }
 
     /// Continues the search for the edges of the admissible stretch around the tip.
@@ -150,7 +151,7 @@ impl References {
             self.posture,
             estimates.model.tip_m.x,
             &estimates.contact.friction,
-            self.asked_p_ratio,
+            self.asked_p_ratio(),
         );
     }
 

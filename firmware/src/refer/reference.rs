@@ -1,7 +1,7 @@
 //! The reference position of the tip: a sequence of segments along the belt.
 //!
 //! Each segment starts where the previous one ended; after the last one the reference stands still.
-//! Time is counted in ticks, so it does not drift.
+//! Time is counted in ticks, so it does not drift; a tick whose frame is lost does not count.
 
 use heapless::Vec;
 use painleve_shared::range::{self, OutOfRange};

@@ -30,7 +30,8 @@ settings! {
     /// and 14-bit encoders.
     #[derive(Copy)]
     pub struct HybridSettings {
-        /// Desired normal force f_n*.
+        /// Desired normal force f_n*; nothing is learnt of friction and contact from readings at the end of the force
+        /// cell's range.
         normal_force_n: f32 = 10.0, 0.0..=1e3, "N";
         /// Position gain K'_P.
         position_gain_per_s2: f32 = 5800.0, 0.0..=1e6, "1/s²";

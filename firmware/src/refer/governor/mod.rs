@@ -7,7 +7,7 @@
 //! a bound and holds it at the edge.
 //!
 //! The search for the edges goes outwards from the tip, one point at a time. The time of a tick is
-//! therefore bounded, and the edges follow the friction estimate within about a tenth of a second at 1 kHz.
+//! therefore bounded, and the edges follow the friction estimate within about a third of a second at 1 kHz.
 
 mod search;
 mod settings;
@@ -30,6 +30,9 @@ pub const USABLE_REACH: f32 = 0.995;
 const JUMP_M: f32 = 2e-3;
 /// A reference nearer than this, m, has been caught up with.
 const CAUGHT_M: f32 = 2e-5;
+/// What p lacks at a place whose distance reaches beyond the arm, for each metre from the middle, 1/(kg·m): more than p lacks
+/// elsewhere, so that of such places the innermost counts as the best.
+const OUT_OF_REACH_PER_KG_M: f32 = 1e9;
 /// Rate at which the remaining distance to a target decays, 1/s.
 const APPROACH_PER_S: f32 = 20.0;
 
@@ -52,8 +55,8 @@ pub struct EdgeGovernor {
     search: Search,
     /// Posture for which it looks, and the least ratio p/Q22 that it requires beyond the setting; `None` before the first.
     searched_for: Option<(Posture, f32)>,
-    /// For what both edges have been found, if anything.
-    found_for: Option<(Posture, f32)>,
+    /// Whether both edges have been found for it.
+    found: bool,
     /// The last reference followed: position (m) and velocity (m/s).
     position_m: f32,
     velocity_m_s: f32,
@@ -77,7 +80,7 @@ impl EdgeGovernor {
             },
             search: Search::start(1.0, 0.0),
             searched_for: None,
-            found_for: None,
+            found: false,
             position_m: 0.0,
             velocity_m_s: 0.0,
             follows: false,
@@ -102,7 +105,7 @@ impl EdgeGovernor {
 
     /// Returns whether both edges have been found for this posture and least p/Q22.
     pub fn has_edges_for(&self, posture: Posture, landing_p_ratio: f32) -> bool {
-        self.found_for == Some((posture, landing_p_ratio))
+        self.found && self.searched_for == Some((posture, landing_p_ratio))
     }
 
     /// Returns the last reference at rest: the position to hold while nothing can follow.
@@ -131,14 +134,15 @@ impl EdgeGovernor {
                 .searched_for
                 .is_none_or(|(before, _)| before != posture)
             {
+                // Farther from the tip nothing is known: a reference that went there might not stop at the edge.
                 self.stretch = Stretch {
-                    lower_m: -reach,
-                    upper_m: reach,
+                    lower_m: tip_t_m - JUMP_M,
+                    upper_m: tip_t_m + JUMP_M,
                 };
             }
             self.searched_for = Some((posture, landing_p_ratio));
             self.search = Search::start(1.0, tip_t_m);
-            self.found_for = None;
+            self.found = false;
         }
         let search = self.search;
         let direction = search.direction;
@@ -148,16 +152,19 @@ impl EdgeGovernor {
         let there_m = point_m + direction * self.distance_m;
         let row = arm.inverse_inertia_row_on_belt(there_m, posture);
         // How much p exceeds its least value, 1/kg. Where it does, sliding has a solution with the margin.
-        let excess_per_kg = row.map_or(f32::MIN, |ScaledRow { q12, q22, factor }| {
-            let against = if friction.slip_seen {
-                friction.slip.sign::<f32>() * q12
-            } else {
-                // Both directions must be admissible.
-                q12.abs()
-            };
-            let least = (least_p_ratio * q22).at_least(self.settings.p_per_kg * factor);
-            (q22 - worst_friction * against - least) / factor
-        });
+        let excess_per_kg = row.map_or(
+            -OUT_OF_REACH_PER_KG_M * point_m.abs(),
+            |ScaledRow { q12, q22, factor }| {
+                let against = if friction.slip_seen {
+                    friction.slip.sign::<f32>() * q12
+                } else {
+                    // Both directions must be admissible.
+                    q12.abs()
+                };
+                let least = (least_p_ratio * q22).at_least(self.settings.p_per_kg * factor);
+                (q22 - worst_friction * against - least) / factor
+            },
+        );
         let edge_m = match search.next(point_m, excess_per_kg, reach) {
             ControlFlow::Continue(search) => {
                 self.search = search;
@@ -174,7 +181,7 @@ impl EdgeGovernor {
         } else {
             // A stretch shorter than both margins shrinks to a point.
             self.stretch.lower_m = edge_m.at_most(self.stretch.upper_m);
-            self.found_for = self.searched_for;
+            self.found = true;
         }
         self.search = Search::start(-direction, tip_t_m);
     }

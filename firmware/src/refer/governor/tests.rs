@@ -323,8 +323,31 @@ fn edges_of_the_other_posture_are_forgotten() {
     assert!(!governor.has_edges_for(Posture::ElbowDown, 0.2));
     governor.search(&arm(), Posture::ElbowUp, 0.0, &friction, 0.0);
     assert!(!governor.has_edges_for(Posture::ElbowUp, 0.0));
-    let upper_m = governor.stretch().upper_m;
-    assert!(upper_m > 0.183, "{upper_m}");
+    // A tip that had moved on to another place.
+    governor.search(&arm(), Posture::ElbowDown, 0.05, &friction, 0.0);
+    let Stretch { lower_m, upper_m } = governor.stretch();
+    assert!(lower_m < 0.05 && upper_m > 0.05 && upper_m - lower_m < 0.005);
+}
+
+/// A margin that no place in reach keeps.
+#[test]
+fn of_places_that_are_all_out_of_reach_the_innermost_is_the_best() {
+    for tip_t_m in [0.1, 0.15, 0.164, -0.164] {
+        let settings = GovernorSettings {
+            distance_m: 0.5,
+            ..Default::default()
+        };
+        let mut governor = with(&configuration(&settings));
+        let friction = known(0.6, Slip::Positive);
+        for _ in 0..30 {
+            governor.search(&arm(), Posture::ElbowDown, tip_t_m, &friction, 0.0);
+        }
+        let Stretch { lower_m, upper_m } = governor.stretch();
+        assert!(
+            lower_m.abs().max(upper_m.abs()) < tip_t_m.abs(),
+            "{lower_m} {upper_m}"
+        );
+    }
 }
 
 #[test]

@@ -5,6 +5,7 @@ mod bits;
 mod contact_force;
 mod contact_states;
 mod documentation;
+mod edges;
 mod links;
 mod mujoco_arms;
 mod open_loop_section;

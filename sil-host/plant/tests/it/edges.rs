@@ -1,0 +1,74 @@
+//! The governor knows the edges before a reference can pass them, for the posture that the arm has.
+
+use painleve_plant::closed_loop::{ClosedLoop, LoopResult};
+use painleve_plant::controller_host::InProcess;
+use painleve_plant::scenario::Scenario;
+use painleve_plant::simulation::Simulation;
+use painleve_shared::status::Fault;
+
+fn run(scenario: &str, overrides: &[&str]) -> LoopResult {
+    let overrides: Vec<String> = overrides.iter().map(ToString::to_string).collect();
+    let scenario = Scenario::load(scenario, &overrides).unwrap();
+    let host = InProcess::new(&scenario.controller_configuration()).unwrap();
+    let mut closed_loop = ClosedLoop::new(Simulation::new(&scenario).unwrap(), host);
+    for _ in 0..scenario.run.ticks() {
+        closed_loop.tick(&mut ()).unwrap();
+    }
+    closed_loop.finish().0
+}
+
+/// A reference that starts fast, before both edges have been found, and ends beyond one.
+#[test]
+fn a_reference_waits_until_the_edges_have_been_found() {
+    let end = run(
+        "edge",
+        &[
+            "initial.tip_m=0.14",
+            "run.duration_s=2",
+            "controller.reference=[{ minimum-jerk = { target_m = 0.18, duration_s = 0.1 } }]",
+        ],
+    );
+    assert_eq!((end.statistics.lift_offs, end.fault), (0, None));
+}
+
+/// The elbow of this arm, which is switched on in the air, swings through straight after its recovery has begun. It lands
+/// elbow down, where the upper edge is nearer than elbow up.
+#[test]
+fn an_arm_that_lands_in_another_posture_keeps_its_edges() {
+    let end = run(
+        "capture",
+        &[
+            "run.enable_at_s=0.1",
+            "run.duration_s=4",
+            "initial.theta1_deg=55.133",
+            "initial.theta2_deg=-43.305",
+            "initial.theta1_dot_rad_s=3.309",
+            "initial.theta2_dot_rad_s=4.103",
+            "controller.reference=[{ hold = { duration_s = 2 } }, \
+             { minimum-jerk = { target_m = 0.184, duration_s = 1 } }]",
+        ],
+    );
+    assert_eq!((end.statistics.lift_offs, end.fault), (0, None));
+}
+
+/// The margin is larger than any place in reach can keep.
+#[test]
+fn a_thrown_tip_lands_no_nearer_the_edge_for_a_larger_margin() {
+    let place_m = |distance_m: &str| {
+        let distance = format!("controller.governor.distance_m={distance_m}");
+        run("capture", &[&distance]).final_tip_t_m
+    };
+    let (near_m, far_m) = (place_m("0.06"), place_m("0.1"));
+    assert!(far_m < near_m && near_m < 0.11, "{far_m} {near_m}");
+}
+
+/// At this control rate the default gains are far too high.
+#[test]
+fn estimates_of_an_unstable_arm_stay_numbers() {
+    let end = run(
+        "edge",
+        &["run.tick_hz=10", "controller.estimator.bandwidth_rad_s=29"],
+    );
+    assert_ne!(end.fault, None);
+    assert_ne!(end.fault, Some(Fault::NotFinite));
+}
