@@ -155,11 +155,12 @@ fn of_geometry(parameters: &Parameters, deviation: impl Fn(Parameter) -> f64) ->
     let [length_1, _] = parameters.link_length_m();
     let ratio = deviation(Parameter::Ratio) * length_1;
     let length = deviation(Parameter::Length);
+    let length_2 = libm::hypot(parameters.get(Parameter::Ratio) * length, ratio);
     Knowledge {
         encoder_zero_rad: [0, 1].map(|joint| deviation(Parameter::Zero(joint))),
         encoder_once_rad: larger(Parameter::Sine, Parameter::Cosine),
         encoder_twice_rad: larger(Parameter::SecondSine, Parameter::SecondCosine),
-        link_length_m: [length, rounded(libm::hypot(length, ratio))],
+        link_length_m: [length, rounded(length_2)],
         height_m: deviation(Parameter::Height),
         ..Knowledge::default()
     }
@@ -222,12 +223,8 @@ pub fn slide_scenario(
     posture: Posture,
     force_n: f64,
 ) -> Result<Scenario, ScenarioError> {
-    let arm = Arm::new(scenario.controller_configuration().arm).map_err(|source| {
-        ScenarioError::Range {
-            origin: scenario.name.clone(),
-            source,
-        }
-    })?;
+    let arm = Arm::new(scenario.controller_configuration().arm)
+        .map_err(|source| ScenarioError::range(&scenario.name, source))?;
     let end_m = share * f64::from(arm.reach_on_belt_m());
     let half_s = end_m / SPEED_M_S;
     let duration_s = 4.0 * half_s + 3.0 * REST_S;
@@ -253,6 +250,7 @@ pub fn slide_scenario(
         law,
         reference,
         format!("run.duration_s={duration_s}"),
+        "controller.governor.enabled=true".to_owned(),
         format!("controller.governor.p_per_kg={LEAST_P_PER_KG:?}"),
         format!("belt.profile={{ kind = 'constant', speed_m_s = {speed_m_s:?} }}"),
     ];
@@ -301,11 +299,13 @@ pub fn identify_arm<R: SlideRig>(
                     program.run.ticks() as usize
                 };
                 let slide = slide_of(scenario, posture, slid.ticks, whole);
-                if let Some(surprise) = surprise {
-                    let misread = misread(&slide, &prior, &limits);
-                    return Err(misread.unwrap_or(surprise.refusal(index)).into());
-                }
                 let belt_m_s = program.belt.profile.speed_m_s(0.0);
+                if let Some(surprise) = surprise {
+                    let refusal = misread(index, &slide, &prior, &limits)
+                        .or_else(|| check_friction(index, &slide, belt_m_s, &limits).err())
+                        .unwrap_or(surprise.refusal(index));
+                    return Err(refusal.into());
+                }
                 Ok::<_, IdentificationError<R::Error>>((slide, belt_m_s))
             };
             let [first_n, others_n @ ..] = ATTEMPTS_N;
@@ -383,8 +383,10 @@ impl Found {
         };
         let limits = limits(scenario);
         let tick_hz = f64::from(scenario.run.tick_hz);
+        let joints = Joints::of(slides, geometry, &known, tick_hz, &limits)?;
+        joints.check()?;
         Ok(Self {
-            joints: Joints::of(slides, geometry, &known, tick_hz, &limits)?,
+            joints,
             ripple_m_s2: ripple_m_s2(slides, geometry, &Arm::new(known)?, tick_hz, &limits),
             identified,
             prior,

@@ -92,7 +92,11 @@ fn slide<R: Rig>(
         let steps = (0..30).map(|step| f64::from(step) * LARGEST_RATIO / 30.0);
         steps.take_while(|ratio| is_allowed(*ratio)).count()
     };
-    let Some(share) = NORMAL_SHARES.into_iter().max_by_key(|share| reach(*share)) else {
+    let Some(share) = NORMAL_SHARES
+        .into_iter()
+        .rev()
+        .max_by_key(|share| reach(*share))
+    else {
         return Ok(Err(NoSlide::TorqueLimit));
     };
     let mut theta = rest.theta_rad;

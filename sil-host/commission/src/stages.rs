@@ -12,7 +12,7 @@ use crate::readings::Session;
 use crate::rest::{RestFound, force_at_rest_n};
 use crate::{CommissionError, Deviation, Mistake, OperatorTask, Rig};
 
-/// Change of f_n, as a part of its value at rest.
+/// Change of the contact force, as a part of f_n at rest.
 const CHANGE: f64 = 0.2;
 
 /// Time in which a torque rises, s.
@@ -53,7 +53,7 @@ pub(crate) fn measure<R: Rig>(
     let model = effects(session, &rest.theta_rad)?;
     let mut measured = Matrix2::zeros();
     for joint in 0..2 {
-        let largest = CHANGE * rest.normal_force_n / model.column(joint).y.abs();
+        let largest = CHANGE * rest.normal_force_n / model.column(joint).norm();
         let torque_nm = largest.min(session.expected.torque_limit_nm);
         let change_n = torque_nm * model.column(joint).norm();
         if change_n < LEAST_COUNTS * f64::from(session.expected.converters.force.per_count()) {

@@ -201,6 +201,16 @@ pub enum Refusal {
         /// Largest distance, mm.
         most_mm: f64,
     },
+    /// The model does not explain the torques.
+    #[error(
+        "the arm's model leaves {left_mnm:.0} of {torque_mnm:.0} mN·m of torque unexplained (root mean square): check the lines of the force cell and of the torque stages, and the masses, centres of mass and springs that the scenario tells of the arm"
+    )]
+    OtherTorques {
+        /// Torque that is left over, mN·m.
+        left_mnm: f64,
+        /// Torque of the slides, mN·m.
+        torque_mnm: f64,
+    },
     /// A result contradicts what is known.
     #[error(
         "{parameter}: {found:.4}{} by the slides, but {known:.4} ± {deviation:.4} is known beforehand: a link is bent or has another length than told, the belt is elsewhere, or a zero has been taken wrongly",

@@ -22,7 +22,7 @@ use crate::fit::sharing;
 use crate::geometry::joint_rad;
 use crate::parameters::Parameters;
 use crate::verdict::BELIEVED;
-use crate::{Limits, Reading, Slide};
+use crate::{Limits, Reading, Refusal, Slide};
 
 /// Time over which readings are averaged, s.
 const MEAN_S: f64 = 0.1;
@@ -57,6 +57,10 @@ const ALWAYS_OFFSET: f64 = 0.005;
 /// Error of a force cell's gain and cross-talk that is always assumed: they share a scale with the gains of the stages, and
 /// slides hardly tell them from the belt's tilt. The errors of sixty simulated arms have a root mean square of 0.003 to 0.019.
 const ALWAYS_CELL: f64 = 0.012;
+
+/// Largest part of the torques that the model may leave over. Healthy arms leave 0.7 % at most, those with a dead force cell
+/// or stage, or with half the mass, 4 % at least.
+const UNEXPLAINED: f64 = 0.03;
 
 /// Change of the tilt for its derivative, rad.
 const TILTED_RAD: f64 = 1e-4;
@@ -149,9 +153,29 @@ pub struct Joints {
     pub joints: [Joint; 2],
     /// The cells of f_t and f_n.
     pub cells: [Cell; 2],
-    /// Torque that the model leaves over, root mean square, N·m: that of the arm known before, and with this result. `None` if
+    /// Torque that the model leaves over, root mean square, N·m: with the friction known before, and with this result. `None` if
     /// no joint has turned enough.
     pub left_over_nm: Option<[f64; 2]>,
+    /// Torque of the slides, root mean square, N·m.
+    pub torque_nm: f64,
+}
+
+impl Joints {
+    /// Checks that the model explains the torques.
+    ///
+    /// # Errors
+    /// [`Refusal::OtherTorques`] if it does not: no value that it gives is to be believed then.
+    pub fn check(&self) -> Result<(), Refusal> {
+        match self.left_over_nm {
+            Some([_, left_nm]) if left_nm > UNEXPLAINED * self.torque_nm => {
+                Err(Refusal::OtherTorques {
+                    left_mnm: 1e3 * left_nm,
+                    torque_mnm: 1e3 * self.torque_nm,
+                })
+            }
+            _ => Ok(()),
+        }
+    }
 }
 
 /// Means of readings over a short time.
@@ -220,7 +244,10 @@ impl Joints {
         deviations[ZEROS] = ZERO_N;
         deviations[ZEROS + 1] = ZERO_N;
         deviations[BELT] = TILT_RAD;
-        Ok(Self::fitted(&equations, &deviations, known))
+        Ok(Self {
+            torque_nm,
+            ..Self::fitted(&equations, &deviations, known)
+        })
     }
 
     /// Takes the parameters from the unknowns that solve the equations.
@@ -264,6 +291,7 @@ impl Joints {
             joints: [joint(0), joint(1)],
             cells: solution.cells(),
             left_over_nm: (!equations.is_empty()).then(|| [rms(&before), rms(&solution.unknowns)]),
+            torque_nm: 0.0,
         }
     }
 }

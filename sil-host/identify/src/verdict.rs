@@ -53,21 +53,30 @@ const OTHERS: [(Change, Refusal); 3] = [
 ];
 
 /// Returns which other way of mounting the encoders puts the tip, where it first touches the belt, on that belt and in the
-/// posture told; `None` if the angles as they are do, or none does. For a slide that ends before it shows a line.
-pub fn misread(slide: &Slide, prior: &Prior, limits: &Limits) -> Option<Refusal> {
+/// posture told, or that only the posture is another one; `None` if the angles as they are do, or nothing explains them. For
+/// a slide that ends before it shows a line.
+pub fn misread(index: usize, slide: &Slide, prior: &Prior, limits: &Limits) -> Option<Refusal> {
     let encoders_rad = slide.on_belt(limits).next()?.encoders_rad;
-    let is_as_told = |encoders_rad: [f64; 2]| {
+    let found = |encoders_rad: [f64; 2]| posture(joint_rad(&prior.parameters, 1, encoders_rad[1]));
+    let is_on_belt = |encoders_rad: [f64; 2]| {
         let place = Place::at(&prior.parameters, encoders_rad);
         let deviation_m = place.depth_by.component_mul(&prior.deviations).norm();
         place.depth_m.abs() <= BELIEVED * deviation_m
-            && posture(joint_rad(&prior.parameters, 1, encoders_rad[1])) == slide.posture
     };
+    let is_as_told =
+        |encoders_rad: [f64; 2]| is_on_belt(encoders_rad) && found(encoders_rad) == slide.posture;
     if is_as_told(encoders_rad) {
         return None;
     }
     let mut others = OTHERS.into_iter();
-    let (_, refusal) = others.find(|(change, _)| is_as_told(change(encoders_rad)))?;
-    Some(refusal)
+    let other = others.find(|(change, _)| is_as_told(change(encoders_rad)));
+    let in_posture = || {
+        is_on_belt(encoders_rad).then(|| Refusal::OtherPosture {
+            slide: index,
+            found: found(encoders_rad),
+        })
+    };
+    other.map(|(_, refusal)| refusal).or_else(in_posture)
 }
 
 /// Checks that friction pushes the tip as a belt does that runs at this speed, m/s, faster than the tip.

@@ -68,7 +68,11 @@ fn encoders_are_named_by_where_the_tip_is_set_down() {
                     missing: 0,
                     whole: 9000,
                 };
-                assert_eq!(misread(&slide, &rig.prior, &limits()), *expected, "{seed}");
+                assert_eq!(
+                    misread(0, &slide, &rig.prior, &limits()),
+                    *expected,
+                    "{seed}"
+                );
             }
         }
     }
