@@ -141,6 +141,12 @@ impl<T: Real> Arm<T> {
         let [own_1, own_2] = parameters
             .link_inertia_kg_m2
             .unwrap_or([rod(mass_1, length_1), rod(mass_2, length_2)]);
+        for (own, mass, length) in [(own_1, mass_1, length_1), (own_2, mass_2, length_2)] {
+            // Four times that of a link whose mass is at both of its ends: more is in other units.
+            let ratio = own / (mass * length * length);
+            range::check("link_inertia_kg_m2 / (m l²)", ratio, 0.0, 1.0)
+                .map_err(|error| error.inside("arm"))?;
+        }
         let [rotor_1, rotor_2] = parameters.rotor_inertia_kg_m2;
         let tip = parameters.tip_mass_kg;
         // Mass at the end of link 1, and the moments of mass about both joints.

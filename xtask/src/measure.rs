@@ -391,7 +391,7 @@ mod tests {
     }
 
     /// Pictures that `figures` does not draw, and where they come from.
-    const OTHER_PICTURES: [(&str, &str); 12] = [
+    const OTHER_PICTURES: [(&str, &str); 15] = [
         ("smoothness", "a test draws it from docs/measured"),
         (
             "work-precision",
@@ -401,8 +401,11 @@ mod tests {
         ("ablation", "the lab book"),
         ("effects-rigid", "the lab book"),
         ("effects-compliant", "the lab book"),
+        ("identified", "a test draws it from a rehearsal"),
         ("arm", "by hand"),
+        ("arm-measures", "by hand"),
         ("commissioning", "by hand"),
+        ("set-down", "by hand"),
         ("tick", "by hand"),
         ("wiring", "by hand"),
         ("wiring-bare-board", "by hand"),

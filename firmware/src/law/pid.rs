@@ -1,7 +1,7 @@
 //! The paper's PID on the joint angles q' = (θ1, θ2 − θ1) (section III-A).
 //!
 //! u_i = K_P,i e_i + K_I,i ∫ e_i dt + K_D,i ė_i with e = q'* − q', where q'* puts
-//! the tip on the belt at z_t* in the arm's posture.
+//! the tip on the belt at z_t* in the posture in which the drive was armed or the tip landed.
 
 use painleve_shared::{JointTorque, LinkMotion, Real, settings};
 

@@ -14,7 +14,7 @@ pub struct LawInput<'a> {
     pub arm: &'a Arm<f32>,
     /// The model's terms at the estimated state.
     pub model: &'a Model,
-    /// Posture of the arm; of a thrown one, that in which it is to land.
+    /// Posture in which the drive was armed or the tip landed.
     pub posture: Posture,
     /// The contact's estimate.
     pub contact: &'a ContactEstimate,

@@ -41,10 +41,12 @@ pub struct References {
     governor: EdgeGovernor,
     /// Least p as a fraction of Q22 at which a recovered tip may land.
     landing_p_ratio: f32,
-    /// Posture of the arm or, of a thrown one, that in which it is to land.
+    /// Posture in which the drive was armed or the tip landed or, of a thrown one, that in which it is to land.
     posture: Posture,
     /// Whether the edges depend on where a thrown tip may land.
     pub asks_for_landing: bool,
+    /// Whether the program waits for the edges: if it began before, it would have to catch up, and could overtake a slow belt.
+    waits: bool,
     generator: ReferenceGenerator,
 }
 
@@ -61,6 +63,7 @@ impl References {
             asks_for_landing: false,
             governor,
             landing_p_ratio,
+            waits: false,
             generator,
         }
     }
@@ -86,11 +89,11 @@ impl References {
         let recovering = drives && phase.recovers && !contact.touches && descends;
         self.asks_for_landing = recovering || landing.is_some();
         let tip_t_m = model.tip_m.x;
-        // While the drive is off, the edges are searched for the posture in which it would be armed; a thrown arm may land in
-        // another posture than it was to land in.
-        if contact.touches || !drives {
+        // While the drive is off, the edges are searched for the posture in which it would be armed. A thrown arm may land in
+        // another posture than it was to land in. A tip that stays on the belt may be dragged past the straight arm and back.
+        if phase.arms || contact.lands || !drives {
             self.posture = Posture::of(&model.theta_rad);
-        } else if let Some(posture) = landing {
+        } else if let (false, Some(posture)) = (contact.touches, landing) {
             self.posture = posture;
         }
         let starts = phase.arms || contact.lands;
@@ -106,7 +109,9 @@ impl References {
             SupervisorState::Armed => self.generator.start(),
             // The reference waits for a tip that is being returned to the belt.
             SupervisorState::LiftOff if recovering => self.generator.present(),
-            SupervisorState::Tracking if phase.starts_tracking => self.generator.start(),
+            SupervisorState::Tracking if phase.starts_tracking || self.waits => {
+                self.generator.start()
+            }
             SupervisorState::Tracking | SupervisorState::LiftOff => self.generator.next_tick(),
             SupervisorState::Idle | SupervisorState::Fault => TipReference::at_rest(tip_t_m),
         };
@@ -158,6 +163,7 @@ impl References {
     /// Prepares the program's reference for the next tick of a drive in this state.
     #[inline]
     pub fn prepare(&mut self, drive: SupervisorState) {
+        self.waits = !(self.generator.has_begun() || self.governor.knows_edges());
         if matches!(drive, SupervisorState::Tracking | SupervisorState::LiftOff) {
             self.generator.prepare();
         }

@@ -193,6 +193,11 @@ impl ReferenceGenerator {
         self.next
     }
 
+    /// Returns whether a tick of the program has passed.
+    pub fn has_begun(&self) -> bool {
+        self.elapsed_ticks > 0 || self.segment > 0
+    }
+
     /// Returns whether the last segment has ended.
     pub fn is_done(&self) -> bool {
         self.segment >= self.program.segments.len()

@@ -1,5 +1,6 @@
 //! A scenario that a command line gives: by name, as a file, or as the record of a run.
 
+use std::collections::BTreeMap;
 use std::io::BufReader;
 use std::path::Path;
 
@@ -38,10 +39,18 @@ pub fn load(name: &str) -> Result<Scenario, CommandError> {
 /// # Errors
 /// [`CommandError`] if the file is not a record of a run.
 pub fn of_record(path: &Path) -> Result<Scenario, CommandError> {
+    let settings = notes_of_record(path)?.remove("configuration");
+    let settings = settings.ok_or_else(|| InputError::record(path, RecordFileError::NoSettings))?;
+    Ok(Scenario::of_record(path, &settings)?)
+}
+
+/// Returns what a record says of its run.
+///
+/// # Errors
+/// [`InputError::Record`] if the file cannot be read.
+pub fn notes_of_record(path: &Path) -> Result<BTreeMap<String, String>, InputError> {
     let file = input_file::open(path).map_err(|error| InputError::record(path, error))?;
     let notes = record_file::notes(BufReader::new(file))
         .map_err(|damage| InputError::record(path, ExportError::from(damage)))?;
-    let settings = notes.and_then(|mut notes| notes.remove("configuration"));
-    let settings = settings.ok_or_else(|| InputError::record(path, RecordFileError::NoSettings))?;
-    Ok(Scenario::of_record(path, &settings)?)
+    Ok(notes.unwrap_or_default())
 }

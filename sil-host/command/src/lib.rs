@@ -231,9 +231,6 @@ pub enum CommandError {
     /// Ctrl-C or a request to end.
     #[error("interrupted")]
     Interrupted,
-    /// The reader of standard output has closed it.
-    #[error("")]
-    Unread,
 }
 
 impl CommandError {
@@ -281,7 +278,6 @@ impl CommandError {
             Self::DeadlinesMissed(_) => DEADLINES_MISSED,
             Self::FailedOn(_) => FAILED_ON,
             Self::Reported { code, .. } | Self::Told { code } => *code,
-            Self::Unread => 0,
         }
     }
 }
@@ -295,14 +291,17 @@ impl From<std::io::Error> for CommandError {
 
 /// Writes a line to standard output.
 fn say(line: impl std::fmt::Display) -> Result<(), CommandError> {
-    terminal::say(line).map_err(unsaid)
+    said(terminal::say(line))
 }
 
-/// Returns the error of a write to standard output.
-fn unsaid(error: std::io::Error) -> CommandError {
-    match error.kind() {
-        std::io::ErrorKind::BrokenPipe => CommandError::Unread,
-        _ => output(OutputError::StandardOutput(error)),
+/// Returns the outcome of a write to standard output. A reader who has closed it wants no more; the command's own outcome
+/// counts all the same.
+fn said(written: std::io::Result<()>) -> Result<(), CommandError> {
+    match written {
+        Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => {
+            Err(output(OutputError::StandardOutput(error)))
+        }
+        _ => Ok(()),
     }
 }
 
@@ -326,7 +325,7 @@ fn tell_usage(usage: &clap::Error) -> ExitCode {
         return ExitCode::from(2);
     }
     let written = usage.print().and_then(|()| std::io::stdout().flush());
-    match written.map_err(unsaid) {
+    match said(written) {
         Err(error) if !usage.use_stderr() => exit_code_of(&error),
         _ => u8::try_from(usage.exit_code()).unwrap_or(2).into(),
     }
@@ -351,9 +350,9 @@ fn mistaken_command(usage: &clap::Error, first: Option<&str>) -> Option<String> 
     })
 }
 
-/// Prints an error, unless it has been printed or nobody wants it, and returns the exit code of the process.
+/// Prints an error, unless it has been printed, and returns the exit code of the process.
 fn exit_code_of(error: &CommandError) -> ExitCode {
-    if !matches!(error, CommandError::Told { .. } | CommandError::Unread) {
+    if !matches!(error, CommandError::Told { .. }) {
         warn(format_args!("error: {error}"));
     }
     ExitCode::from(error.exit_code())

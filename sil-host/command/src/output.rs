@@ -192,8 +192,8 @@ impl Output {
 
 /// Returns where what has been measured of an arm is written by default: that of a rehearsal apart from that of a real arm.
 pub fn default_output(rehearses: bool, name: &str) -> PathBuf {
-    let name = if rehearses { "rehearsed" } else { name };
-    format!("out/{name}.toml").into()
+    let folder = if rehearses { "out/rehearsed" } else { "out" };
+    format!("{folder}/{name}.toml").into()
 }
 
 /// Tells, after a failure, which results of an earlier run are still there.

@@ -173,9 +173,14 @@ pub enum InputError {
     Rehearsal(#[from] SimulatedError),
     /// A scenario of a simulated arm for a real one.
     #[error(
-        "this scenario describes a simulated arm (knowledge.source: {0}): commission the real one with painleve commission --port"
+        "this scenario describes a simulated arm (knowledge.source: {0}): start from the file of the real one, and commission it with painleve commission --port"
     )]
     Rehearsed(String),
+    /// Slides of an arm whose parts may be mounted in the other direction.
+    #[error(
+        "this scenario has never been commissioned: if a sensor or a stage is mounted in the other direction, the feedback is positive; measure the arm with painleve commission first"
+    )]
+    NotCommissioned,
     /// `--live` together with another host.
     #[error("--live runs the controller in this process: leave out --host")]
     LiveHost,

@@ -20,6 +20,7 @@ use painleve_commission::{OperatorTask, Rig};
 use painleve_firmware::SOURCES;
 use painleve_plant::law_choice::build;
 use painleve_plant::scenario::Scenario;
+use painleve_plant::scenario::built_in::DEFAULT;
 use painleve_shared::Posture;
 use painleve_shared::black_box::BlackBox;
 use painleve_shared::counts::TorqueCounts;
@@ -260,7 +261,14 @@ fn output(child: Child) -> (Output, Instant) {
 
 /// Plays the operator of `commission`, who does every task at once.
 fn commission(board: &Board, bench: &Bench) -> (Output, Instant, String) {
-    let arguments = ["commission", RATE[0], RATE[1], "--output", "found.toml"];
+    let arguments = [
+        "commission",
+        DEFAULT,
+        RATE[0],
+        RATE[1],
+        "--output",
+        "found.toml",
+    ];
     let mut child = board.start(bench, &arguments);
     let mut text = String::new();
     for line in BufReader::new(child.stderr.take().unwrap()).lines() {
@@ -312,7 +320,7 @@ fn drive_on_broken_line(intact: usize, break_: Break) {
     let what = format!("drive, {break_:?} after {intact} bytes");
     let bench = Bench::new("broken");
     let board = Board::new(intact, break_);
-    let arguments = ["drive", RATE[0], RATE[1], "--record", "drive.mcap"];
+    let arguments = ["drive", DEFAULT, RATE[0], RATE[1], "--record", "drive.mcap"];
     let (output, ended) = output(board.start(&bench, &arguments));
     let text = errors(&output);
     check_end(&what, &board, ended, output.status.code(), &text);
@@ -392,7 +400,7 @@ fn open_elsewhere(port: &Path) -> Option<Output> {
 fn a_port_in_use_is_refused_by_every_command_and_its_user_is_not_disturbed() {
     let board = Board::new(usize::MAX, Break::Silence);
     let bench = Bench::new("in-use");
-    let drive = ["drive", "--dry-run", "--no-record", "--json"];
+    let drive = ["drive", DEFAULT, "--dry-run", "--no-record", "--json"];
     let mut user = board.start(&bench, &drive);
     board.wait_for_ticks(100);
 
@@ -403,7 +411,7 @@ fn a_port_in_use_is_refused_by_every_command_and_its_user_is_not_disturbed() {
         &["bridge", "serial", "--bus", &bench.bus],
         &drive,
         &["drive", "--stored"],
-        &["commission"],
+        &["commission", DEFAULT],
         &["timing", scenario, "--host", "serial"],
     ] {
         let (output, _) = output(board.start(&bench, arguments));
@@ -443,9 +451,9 @@ fn bytes_that_are_no_frames_are_told_from_silence() {
     std::thread::scope(|scope| {
         for break_ in [Break::Garbage, Break::Silence] {
             for arguments in [
-                &["drive", "--no-record"][..],
+                &["drive", DEFAULT, "--no-record"][..],
                 &["drive", "--stored"],
-                &["commission"],
+                &["commission", DEFAULT],
                 &["timing", "hybrid-elbow-down", "--host", "serial"],
                 &["run", "--host", "serial", "--no-record", "--no-plot"],
             ] {

@@ -97,7 +97,11 @@ fn the_commands_of_the_tutorials_succeed() {
         executed += 1;
     }
     assert!(executed >= 10, "only {executed} commands found");
-    for file in ["out/run.html", "out/my-arm.html", "out/rehearsed.toml"] {
+    for file in [
+        "out/run.html",
+        "out/my-arm.html",
+        "out/rehearsed/identified.toml",
+    ] {
         assert!(bench.path(file).exists(), "{file}");
     }
 }

@@ -244,12 +244,15 @@ fn options_without_effect_are_refused() {
             "run edge --fail-on missed-deadline --pacing realtime --host serial --port x",
             "--fail-on missed-deadline",
         ),
-        ("commission --port x --mistake belt-too-high", "--mistake"),
         (
-            "commission --port x --seed 4",
+            "commission edge --port x --mistake belt-too-high",
+            "--mistake",
+        ),
+        (
+            "commission edge --port x --seed 4",
             "--seed has no effect without --rehearse",
         ),
-        ("identify --port x --mistake bent-link", "--mistake"),
+        ("identify edge --port x --mistake bent-link", "--mistake"),
         ("identify --slide elbow-up=r.mcap --seed 3", "--seed"),
         (
             "scenarios --schema --diff",

@@ -30,9 +30,14 @@ fn a_rehearsal_writes_what_it_has_found() {
             "{found}"
         );
     }
-    let differences = bench.report(&["diff", "hybrid-elbow-down", "out/rehearsed.toml", "--json"]);
+    let differences = bench.report(&[
+        "diff",
+        "hybrid-elbow-down",
+        "out/rehearsed/identified.toml",
+        "--json",
+    ]);
     let written = differences["differences"].as_array().unwrap();
-    let page = std::fs::read_to_string(bench.path("out/rehearsed.html")).unwrap();
+    let page = std::fs::read_to_string(bench.path("out/rehearsed/identified.html")).unwrap();
     for part in [
         "Identification: hybrid-elbow-down",
         "friction",
@@ -63,7 +68,7 @@ fn an_arm_that_has_changed_since_it_was_identified_is_told() {
     let changes = |seed: &str, length: &[&str]| {
         let line = [
             "identify",
-            "out/rehearsed.toml",
+            "out/rehearsed/identified.toml",
             "--rehearse",
             "--output",
             "out/rehearsed-again.toml",
@@ -72,7 +77,7 @@ fn an_arm_that_has_changed_since_it_was_identified_is_told() {
             "--json",
         ];
         let report = bench.report(&[&line[..], length].concat());
-        let page = std::fs::read_to_string(bench.path("out/rehearsed.html")).unwrap();
+        let page = std::fs::read_to_string(bench.path("out/rehearsed/identified.html")).unwrap();
         let changes: Vec<String> = serde_json::from_value(report["changes"].clone()).unwrap();
         assert_eq!(page.matches("Warning: ").count(), changes.len());
         changes
@@ -105,12 +110,36 @@ fn a_rehearsals_scenario_drives_no_real_arm() {
     let bench = Bench::new("rehearsed");
     let rehearsal = bench.run(&["commission", "--rehearse"]);
     assert!(rehearsal.status.success(), "{}", errors(&rehearsal));
-    for command in [&["drive"][..], &["drive", "--store"], &["identify"]] {
-        let of_rehearsal = ["out/rehearsed.toml", "--port", "/dev/null"];
+    for command in [
+        &["drive"][..],
+        &["drive", "--store"],
+        &["identify"],
+        &["commission"],
+    ] {
+        let of_rehearsal = ["out/rehearsed/commissioned.toml", "--port", "/dev/null"];
         let refused = bench.run(&[command, &of_rehearsal].concat());
         assert_eq!(code(refused.status), 2, "{}", errors(&refused));
         let reason = "describes a simulated arm (knowledge.source: rehearsal with seed 1)";
         assert!(errors(&refused).contains(reason), "{}", errors(&refused));
+    }
+}
+
+/// Its parts may be mounted in the other direction; without a scenario, it would be the paper's arm.
+#[test]
+fn an_arm_that_was_not_commissioned_or_not_named_slides_nowhere() {
+    let bench = Bench::new("not-commissioned");
+    let new = bench.run(&["identify", "edge", "--port", "/dev/null"]);
+    assert_eq!(code(new.status), 2, "{}", errors(&new));
+    let reason = "has never been commissioned";
+    assert!(errors(&new).contains(reason), "{}", errors(&new));
+    for command in ["drive", "commission", "identify"] {
+        let unnamed = bench.run(&[command, "--port", "/dev/null"]);
+        assert_eq!(code(unnamed.status), 2, "{}", errors(&unnamed));
+        assert!(
+            errors(&unnamed).contains("<SCENARIO>"),
+            "{}",
+            errors(&unnamed)
+        );
     }
 }
 
@@ -159,6 +188,17 @@ fn records_of_slides_show_an_arm() {
         let error_nm = friction_nm(&found, joint) - FRICTION_NM;
         assert!(error_nm.abs() < 0.06 * FRICTION_NM, "{joint}: {found}");
     }
+    // Records of a simulation describe no real arm, either.
+    let driven = bench.run(&["drive", "out/identified.toml", "--port", "/dev/null"]);
+    let reason = "simulated arm (knowledge.source: rehearsal: 2 recorded slides)";
+    assert!(errors(&driven).contains(reason), "{}", errors(&driven));
+    let twice = [&line[..], &["--slide", &slides[0]]].concat();
+    let twice = bench.run(&twice);
+    assert!(
+        errors(&twice).contains("it is given twice"),
+        "{}",
+        errors(&twice)
+    );
     let rescaled = [&line[..], &["--set", "converters.force.range_n=30"]].concat();
     let refused = bench.run(&rescaled);
     assert_eq!(code(refused.status), 2, "{}", errors(&refused));

@@ -30,7 +30,7 @@ pub const USABLE_REACH: f32 = 0.995;
 const JUMP_M: f32 = 2e-3;
 /// A reference nearer than this, m, has been caught up with.
 const CAUGHT_M: f32 = 2e-5;
-/// What p lacks at a place whose distance reaches beyond the arm, for each metre from the middle, 1/(kg·m): more than p lacks
+/// What p lacks at a place whose distance reaches beyond the arm, for each metre from the middle and one more, 1/(kg·m): more than p lacks
 /// elsewhere, so that of such places the innermost counts as the best.
 const OUT_OF_REACH_PER_KG_M: f32 = 1e9;
 /// Rate at which the remaining distance to a target decays, 1/s.
@@ -108,6 +108,11 @@ impl EdgeGovernor {
         self.found && self.searched_for == Some((posture, landing_p_ratio))
     }
 
+    /// Returns whether both edges have been found for the posture that is searched, or are not to be kept.
+    pub fn knows_edges(&self) -> bool {
+        self.found || !self.settings.enabled
+    }
+
     /// Returns the last reference at rest: the position to hold while nothing can follow.
     pub fn present(&self) -> TipReference {
         TipReference::at_rest(self.position_m)
@@ -153,7 +158,7 @@ impl EdgeGovernor {
         let row = arm.inverse_inertia_row_on_belt(there_m, posture);
         // How much p exceeds its least value, 1/kg. Where it does, sliding has a solution with the margin.
         let excess_per_kg = row.map_or(
-            -OUT_OF_REACH_PER_KG_M * point_m.abs(),
+            -OUT_OF_REACH_PER_KG_M * (1.0 + point_m.abs()),
             |ScaledRow { q12, q22, factor }| {
                 let against = if friction.slip_seen {
                     friction.slip.sign::<f32>() * q12

@@ -22,6 +22,7 @@ use serde_json::json;
 use self::board_rig::BoardRig;
 pub use self::board_rig::BoardRigError;
 use self::rehearsal::Rehearsal;
+use super::drive::{check_not_rehearsed, check_rate};
 use super::output::{default_output, warn_of_earlier};
 use super::output_error::{InputError, output};
 use super::{CommandError, distinct_files, say};
@@ -36,7 +37,12 @@ pub struct CommissionArguments {
     #[arg(long = "set", value_name = "KEY=VALUE")]
     overrides: Vec<String>,
     /// Serial port of the board, for example /dev/ttyUSB0.
-    #[arg(long, value_name = "PATH", required_unless_present = "rehearse")]
+    #[arg(
+        long,
+        value_name = "PATH",
+        required_unless_present = "rehearse",
+        requires = "scenario"
+    )]
     pub port: Option<PathBuf>,
     /// Commission the second sensors of each channel, after the first ones: finds their directions.
     #[arg(long)]
@@ -54,7 +60,7 @@ pub struct CommissionArguments {
     /// if that is less.
     #[arg(long, value_name = "N·m")]
     torque_limit_nm: Option<f64>,
-    /// File for the corrected scenario; by default out/commissioned.toml, and out/rehearsed.toml with --rehearse.
+    /// File for the corrected scenario; by default out/commissioned.toml, and out/rehearsed/commissioned.toml with --rehearse.
     #[arg(long, value_name = "PATH")]
     output: Option<PathBuf>,
     /// Print one JSON object on stdout instead of the text.
@@ -88,6 +94,10 @@ pub fn run(arguments: &CommissionArguments) -> Result<(), CommandError> {
     )?;
     let mut scenario = Scenario::load(&arguments.scenario, &arguments.overrides)?;
     let tick_hz = scenario.run.tick_hz;
+    check_rate(&scenario)?;
+    if arguments.port.is_some() {
+        check_not_rehearsed(&scenario)?;
+    }
     let as_written = scenario.clone();
     if tick_hz > FASTEST_HZ {
         // At a lower rate the tracking loops have to be slower.
@@ -99,10 +109,7 @@ pub fn run(arguments: &CommissionArguments) -> Result<(), CommandError> {
         scenario = second_sensors::in_place_of_first(&scenario);
     }
     let range = |source: OutOfRange| {
-        CommandError::Scenario(ScenarioError::Range {
-            origin: arguments.scenario.clone(),
-            source,
-        })
+        CommandError::Scenario(ScenarioError::range(&arguments.scenario, source))
     };
     let torque_limit_nm = torque_limit_nm(arguments, &scenario).map_err(range)?;
     let expected = Expected::new(&scenario, torque_limit_nm).map_err(range)?;

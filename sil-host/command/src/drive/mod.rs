@@ -44,6 +44,7 @@ const HEALTH_INTERVAL: Duration = Duration::from_secs(1);
 pub struct DriveArguments {
     /// Built-in scenario or TOML file with the arm's configuration.
     #[arg(value_name = "SCENARIO", default_value = built_in::DEFAULT)]
+    #[arg(required_unless_present_any = ["stored", "forget"])]
     scenario: String,
     /// Override one key, for example controller.torque_limit_nm=0.5; may be repeated.
     #[arg(long = "set", value_name = "KEY=VALUE")]
@@ -320,15 +321,21 @@ pub(crate) fn check_rate(scenario: &Scenario) -> Result<(), ScenarioError> {
 ///
 /// # Errors
 /// [`InputError::Rehearsed`].
-pub(crate) fn check_commissioned(scenario: &Scenario) -> Result<(), InputError> {
+fn check_commissioned(scenario: &Scenario) -> Result<(), InputError> {
+    check_not_rehearsed(scenario)?;
+    if identification::is_new(scenario) {
+        warn(InputError::NotCommissioned);
+    }
+    Ok(())
+}
+
+/// Refuses a scenario that has been written in a rehearsal: what it says of the arm is that of a simulated one.
+///
+/// # Errors
+/// [`InputError::Rehearsed`].
+pub(crate) fn check_not_rehearsed(scenario: &Scenario) -> Result<(), InputError> {
     if scenario.knowledge.is_rehearsed() {
         return Err(InputError::Rehearsed(scenario.knowledge.source.clone()));
-    }
-    if identification::is_new(scenario) {
-        warn(
-            "this scenario has never been commissioned: if a sensor or a stage is mounted in the other direction, the feedback is \
-             positive; measure the arm with painleve commission first",
-        );
     }
     Ok(())
 }

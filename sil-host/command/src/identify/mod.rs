@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use painleve_commission::identification::{
-    Found, IdentificationError, identify_arm, identify_slides, prior,
+    Found, IdentificationError, identify_arm, identify_slides, is_new, prior,
 };
 use painleve_commission::set_down::{SetDown, advice};
 use painleve_commission::simulated::{GeometryMistake, SimulatedSlides, imperfect};
@@ -27,7 +27,7 @@ use serde_json::json;
 
 use self::board_slides::BoardSlides;
 use self::recorded::Recorded;
-use super::drive::{check_commissioned, check_rate};
+use super::drive::{check_not_rehearsed, check_rate};
 use super::output::{default_output, warn_of_earlier};
 use super::output_error::{InputError, output};
 use super::{CommandError, distinct_files, say};
@@ -54,7 +54,7 @@ pub struct IdentifyArguments {
     #[arg(long = "set", value_name = "KEY=VALUE")]
     overrides: Vec<String>,
     /// Serial port of the board, for example /dev/ttyUSB0.
-    #[arg(long, value_name = "PATH")]
+    #[arg(long, value_name = "PATH", requires = "scenario")]
     #[arg(required_unless_present_any = ["rehearse", "slide"])]
     pub port: Option<PathBuf>,
     /// Rehearse on a simulated arm with random errors that the scenario does not know.
@@ -73,11 +73,12 @@ pub struct IdentifyArguments {
     /// 0.6 %. A line has no scale: positions are as exact as this length.
     #[arg(long, value_name = "M", value_parser = link_length_m)]
     link_1_m: Option<f64>,
-    /// File for the scenario with the measured values; by default out/identified.toml, and out/rehearsed.toml with --rehearse.
+    /// File for the scenario with the measured values; by default out/identified.toml, and out/rehearsed/identified.toml with
+    /// --rehearse.
     #[arg(long, value_name = "PATH")]
     output: Option<PathBuf>,
-    /// Report page, with the tip's distances from the line before and after; by default out/identified.html, and
-    /// out/rehearsed.html with --rehearse.
+    /// Report page, with the tip's distances from the line before and after; by default beside the scenario, with the
+    /// extension html.
     #[arg(long, value_name = "PATH")]
     html: Option<PathBuf>,
     /// Print one JSON object on stdout instead of the text.
@@ -106,19 +107,18 @@ pub fn run(arguments: &IdentifyArguments) -> Result<(), CommandError> {
         arguments.seed,
     )?;
     let mut scenario = Scenario::load(&arguments.scenario, &arguments.overrides)?;
+    recorded::check_distinct(&arguments.slide)?;
     let recorded: Result<Vec<_>, _> = arguments
         .slide
         .iter()
         .map(|it| it.read(&scenario))
         .collect();
     let slides = recorded?;
-    let default = default_output(arguments.rehearse, "identified");
-    let given = |path: &Option<PathBuf>, extension: &str| {
-        let path = path.clone();
-        path.unwrap_or_else(|| default.with_extension(extension))
-    };
-    let output_path = given(&arguments.output, "toml");
-    let html_path = given(&arguments.html, "html");
+    let output_path = arguments.output.clone();
+    let output_path =
+        output_path.unwrap_or_else(|| default_output(arguments.rehearse, "identified"));
+    let html_path = arguments.html.clone();
+    let html_path = html_path.unwrap_or_else(|| output_path.with_extension("html"));
     distinct_files::check(&[("--output", &output_path), ("--html", &html_path)])?;
     let mut drawn = Drawn::default();
     let written = prior(&scenario, &drawn).parameters;
@@ -173,11 +173,22 @@ fn found(
     if !slides.is_empty() {
         let found = identify_slides(slides, scenario, drawn)
             .map_err(|error| failed(name, error, |never| match never {}))?;
-        return Ok((found, format!("{} recorded slides", slides.len())));
+        let source = format!("{} recorded slides", slides.len());
+        let is_simulated =
+            scenario.knowledge.is_rehearsed() || arguments.slide.iter().any(Recorded::is_simulated);
+        let source = if is_simulated {
+            Knowledge::of_simulation(&source)
+        } else {
+            source
+        };
+        return Ok((found, source));
     }
     if let Some(port) = &arguments.port {
         check_rate(scenario)?;
-        check_commissioned(scenario)?;
+        check_not_rehearsed(scenario)?;
+        if is_new(scenario) {
+            return Err(InputError::NotCommissioned.into());
+        }
         let found = on_board(port, scenario, drawn);
         let found = found.map_err(|error| failed(name, error, CommandError::from))?;
         return Ok((found, format!("slides of the arm at {}", port.display())));
@@ -203,10 +214,7 @@ fn on_board(
 }
 
 fn range(name: &str, source: painleve_shared::OutOfRange) -> CommandError {
-    CommandError::Scenario(ScenarioError::Range {
-        origin: name.to_owned(),
-        source,
-    })
+    CommandError::Scenario(ScenarioError::range(name, source))
 }
 
 /// Returns the command's error for one of the identification.

@@ -10,6 +10,7 @@ use painleve_files::input_file;
 use painleve_identify::Slide;
 use painleve_plant::scenario::Scenario;
 use painleve_record::export::{Exported, ticks_to_csv};
+use painleve_record::mcap_log::Source;
 use painleve_shared::counts::{EncoderCounts, ForceCounts, TorqueCounts};
 use painleve_shared::frame::SensorFrame;
 use painleve_study_core::options::PostureOption;
@@ -88,6 +89,16 @@ impl Recorded {
         self.path.extension().is_some_and(|it| it == "csv")
     }
 
+    /// Returns whether its record says that a simulation has made it; a table does not tell.
+    pub fn is_simulated(&self) -> bool {
+        !self.is_table()
+            && given_scenario::notes_of_record(&self.path).is_ok_and(|notes| {
+                notes
+                    .get("source")
+                    .is_some_and(|source| source == Source::Simulation.name())
+            })
+    }
+
     /// Checks that the counts of a record mean what the scenario says; a table does not tell.
     fn check_scales(&self, scenario: &Scenario) -> Result<(), CommandError> {
         let differences = given_scenario::of_record(&self.path)?.differences(scenario);
@@ -117,6 +128,22 @@ impl Recorded {
     }
 }
 
+/// Checks that each file is given once: a slide that counts twice would seem to be known better.
+///
+/// # Errors
+/// [`InputError::Slide`] for a file that is given again.
+pub fn check_distinct(slides: &[Recorded]) -> Result<(), InputError> {
+    for (index, slide) in slides.iter().enumerate() {
+        if slides[..index].iter().any(|it| it.path == slide.path) {
+            return Err(InputError::Slide {
+                path: slide.path.clone(),
+                reason: "it is given twice".into(),
+            });
+        }
+    }
+    Ok(())
+}
+
 /// Reads the ticks of a table.
 fn of_table(table: impl Read) -> Result<Vec<SlideTick>, String> {
     let mut reader = csv::Reader::from_reader(table);
@@ -140,6 +167,12 @@ fn of_table(table: impl Read) -> Result<Vec<SlideTick>, String> {
                 .map_err(|_| format!("{TICK} = {text:?} is not a whole number"))?,
             None => number,
         };
+        let before = ticks.last().map(|it: &SlideTick| it.sensor.tick);
+        if before.is_some_and(|before| tick.wrapping_sub(before).wrapping_sub(1) > u32::MAX / 2) {
+            return Err(format!(
+                "{TICK} = {tick} does not come after the tick before it"
+            ));
+        }
         let mut counts = [0_i64; COLUMNS.len()];
         for (value, (at, name)) in counts.iter_mut().zip(places.into_iter().zip(COLUMNS)) {
             let text = row.get(at).unwrap_or_default();
@@ -192,6 +225,14 @@ mod tests {
         assert_eq!(
             missing.unwrap_err(),
             "it has no column sensor.joint2_counts"
+        );
+        let backwards = format!(
+            "{},{TICK}\n1,2,3,4,5,6,8\n1,2,3,4,5,6,7\n",
+            COLUMNS.join(",")
+        );
+        assert_eq!(
+            of_table(backwards.as_bytes()).unwrap_err(),
+            "sensor.tick = 7 does not come after the tick before it"
         );
         let header = COLUMNS.join(",");
         let wrong = of_table(format!("{header}\n1,x,3,4,5,6\n").as_bytes());

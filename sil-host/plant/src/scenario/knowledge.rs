@@ -45,6 +45,11 @@ impl Knowledge {
         format!("{REHEARSAL} with seed {seed}")
     }
 
+    /// Returns the same of what was measured otherwise of a simulated arm.
+    pub fn of_simulation(source: &str) -> String {
+        format!("{REHEARSAL}: {source}")
+    }
+
     /// Returns in words what leaves the tip's place on the belt most uncertain, each parameter taken alone; `None` if all
     /// are known exactly.
     pub fn chief_doubt(&self, arm: &ArmParameters<f32>) -> Option<String> {

@@ -51,8 +51,6 @@ settings! {
         arm: ArmParameters<f64> = ArmParameters::default();
         /// The arm in the controller's model; the plant's if absent.
         arm_model: Option<ArmParameters<f32>> = None;
-        /// How well the geometry of a real arm is known.
-        knowledge: Knowledge = Knowledge::default();
         /// Friction and speed of the belt.
         belt: BeltSettings = BeltSettings::default();
         /// Restitution of impacts.
@@ -69,6 +67,8 @@ settings! {
         converters: ConverterSettings = ConverterSettings::default();
         /// The controller.
         controller: ControllerSettings<LawChoice> = ControllerSettings::default();
+        /// How well the geometry of a real arm is known. It stands last: a file that was cut off vouches for nothing.
+        knowledge: Knowledge = Knowledge::default();
     }
     check Self::relations;
 }

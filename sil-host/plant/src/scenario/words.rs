@@ -65,6 +65,9 @@ pub(super) fn in_words(message: &str, setting: Option<&Field>) -> String {
     if message.starts_with("data did not match any variant") {
         return "matches none of its kinds".into();
     }
+    if message == "duplicate key" {
+        return "this key is there already: give it once, or merge the two tables".into();
+    }
     let mismatch = ["invalid type: ", "invalid value: ", "invalid length "];
     let mismatch = mismatch
         .into_iter()

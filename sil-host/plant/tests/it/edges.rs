@@ -8,11 +8,11 @@ use painleve_shared::status::Fault;
 
 fn run(scenario: &str, overrides: &[&str]) -> LoopResult {
     let overrides: Vec<String> = overrides.iter().map(ToString::to_string).collect();
-    let scenario = Scenario::load(scenario, &overrides).unwrap();
-    let host = InProcess::new(&scenario.controller_configuration()).unwrap();
-    let mut closed_loop = ClosedLoop::new(Simulation::new(&scenario).unwrap(), host);
+    let scenario = Scenario::load(scenario, &overrides).expect("a valid scenario");
+    let host = InProcess::new(&scenario.controller_configuration()).expect("a valid one");
+    let mut closed_loop = ClosedLoop::new(Simulation::new(&scenario).expect("a plant"), host);
     for _ in 0..scenario.run.ticks() {
-        closed_loop.tick(&mut ()).unwrap();
+        closed_loop.tick(&mut ()).expect("an answer");
     }
     closed_loop.finish().0
 }

@@ -360,9 +360,9 @@ fn margins_grow_with_the_tick_and_with_the_counts() {
     let beyond = minimum_jerk(0.18471);
     // The mean of some seeds: the tip at rest swings by a tenth of a millimetre.
     let held = |overrides: &[&str]| {
-        let seeds = ["run.seed=1", "run.seed=2", "run.seed=3", "run.seed=4"];
-        let held_m = seeds.map(|seed| {
-            let mut all = vec![NOISE, beyond.as_str(), seed];
+        let held_m = [1, 2, 3, 4, 5, 6, 7, 8].map(|seed| {
+            let seed = format!("run.seed={seed}");
+            let mut all = vec![NOISE, beyond.as_str(), seed.as_str()];
             all.extend(overrides);
             let (result, course) = run("hybrid-elbow-down", &all);
             assert_eq!(result.statistics.lift_offs, 0, "{overrides:?}");

@@ -4,7 +4,7 @@ use super::*;
 
 fn tuning() -> Tuning {
     let overrides = [
-        "run.duration_s=1.5",
+        "run.duration_s=1.6",
         "controller.law.hybrid.velocity_gain_per_s=40",
         "controller.law.hybrid.position_gain_per_s2=1900",
     ];
