@@ -157,6 +157,9 @@ pub enum InputError {
         /// What it needs.
         needed: &'static str,
     },
+    /// A setting of an arm that the controller does not use.
+    #[error("--set {0} has no effect on a real arm: its controller uses arm_model, so set that")]
+    OfSimulatedArm(String),
     /// Standard input cannot be read.
     #[error("cannot read standard input: {0}")]
     StandardInput(io::Error),

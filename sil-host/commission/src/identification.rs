@@ -47,6 +47,12 @@ const ROUNDS: [f64; 2] = [0.6, 0.93];
 /// Least p of a slide, 1/kg: where a belt's vibration of 5 m/s² takes a fifth of the force.
 const LEAST_P_PER_KG: f64 = 6.0;
 
+/// The same of a heavy arm, as a part of Q22 at the middle.
+const LEAST_OF_Q22: f64 = 0.6;
+
+/// Largest deviation of the tip's position, as a part of the reach, of a long arm: a small one may have that of its limits.
+const DEVIATION_OF_REACH: f64 = 0.0027;
+
 /// Speed at which a tip that has left the belt is lowered onto it in the second round, m/s: on a belt that hangs, a faster tip
 /// bounces off again and again. In the first round the belt may be farther off than that finds in time.
 const LANDING_M_S: f32 = 0.005;
@@ -188,10 +194,14 @@ fn told_m(scenario: &Scenario) -> f64 {
 /// Returns the limits for a scenario's converters.
 pub fn limits(scenario: &Scenario) -> Limits {
     let counts = f64::from(1_u32 << scenario.converters.encoder.bits);
+    let reach_m = Arm::new(scenario.controller_configuration().arm)
+        .map_or(0.0, |arm| f64::from(arm.reach_on_belt_m()));
+    let least = Limits::default();
     Limits {
         count_rad: core::f64::consts::TAU / counts,
         contact_n: CONTACT_N,
-        ..Limits::default()
+        tip_deviation_m: least.tip_deviation_m.max(DEVIATION_OF_REACH * reach_m),
+        ..least
     }
 }
 
@@ -239,6 +249,8 @@ pub fn slide_scenario(
     // p = Q22 − μ s Q12 with the slip's direction s, against that of the belt.
     let row = arm.inverse_inertia_row_on_belt(0.0, posture);
     let speed_m_s = BELT_M_S.copysign(row.map_or(1.0, |row| f64::from(row.q12)));
+    let light = row.map_or(f64::INFINITY, |row| f64::from(row.q22 / row.factor));
+    let least_p_per_kg = LEAST_P_PER_KG.min(LEAST_OF_Q22 * light);
     // A hybrid law keeps its gains.
     let law = match scenario.controller.law.of_set() {
         Some(LawSettings::Hybrid(_)) => {
@@ -251,7 +263,7 @@ pub fn slide_scenario(
         reference,
         format!("run.duration_s={duration_s}"),
         "controller.governor.enabled=true".to_owned(),
-        format!("controller.governor.p_per_kg={LEAST_P_PER_KG:?}"),
+        format!("controller.governor.p_per_kg={least_p_per_kg:?}"),
         format!("belt.profile={{ kind = 'constant', speed_m_s = {speed_m_s:?} }}"),
     ];
     scenario.clone().with_overrides(&scenario.name, &overrides)
@@ -366,6 +378,10 @@ pub struct Found {
     /// Acceleration of the tip off the belt by what the controller does not know, root mean square, m/s²: the ripple of the
     /// normal force times p. Zero without a reading on the belt.
     pub ripple_m_s2: f64,
+    /// Friction coefficient of the tip on the belt.
+    pub friction: f64,
+    /// The same by the scenario.
+    pub told_friction: f64,
 }
 
 impl Found {
@@ -387,6 +403,8 @@ impl Found {
         joints.check()?;
         Ok(Self {
             joints,
+            friction: friction(slides, &limits),
+            told_friction: scenario.belt.friction,
             ripple_m_s2: ripple_m_s2(slides, geometry, &Arm::new(known)?, tick_hz, &limits),
             identified,
             prior,
@@ -455,6 +473,18 @@ impl Found {
         painleve_shared::settings::Settings::validate(&corrected)?;
         Ok(corrected)
     }
+}
+
+/// Returns the friction coefficient of slides: the sum of |f_t| over that of f_n.
+fn friction(slides: &[Slide], limits: &Limits) -> f64 {
+    let mut sums_n = [0.0; 2];
+    for reading in slides.iter().flat_map(|slide| slide.on_belt(limits)) {
+        for (sum_n, force_n) in sums_n.iter_mut().zip(reading.force_n) {
+            *sum_n += force_n.abs();
+        }
+    }
+    let [tangential_n, normal_n] = sums_n;
+    tangential_n / normal_n
 }
 
 /// Returns the ripple of [`Found::ripple_m_s2`].

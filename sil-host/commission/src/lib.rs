@@ -274,6 +274,7 @@ pub fn commission<R: Rig>(
     rig: &mut R,
     expected: &Expected,
 ) -> Result<Commissioned, CommissionError<R::Error>> {
+    rest::check(expected)?;
     let mut session = Session::new(rig, expected);
     let encoders = encoders::measure(&mut session)?;
     session.set_encoders(encoders.reversed, encoders.offsets, encoders.correction);

@@ -181,11 +181,21 @@ pub enum Mistake {
     },
     /// The model cannot press on the belt.
     #[error(
-        "arm: by the scenario its weight presses on the belt with {expected_n:.2} N only, too little to measure"
+        "arm: by the scenario its weight presses on the belt below joint 1 with {expected_n:.2} N only, too little to measure; check link_mass_kg, the springs, belt_tilt_rad and converters.force.range_n"
     )]
     TooLight {
         /// Force expected from the weight, N.
         expected_n: f64,
+    },
+    /// The model presses harder than the force cell measures.
+    #[error(
+        "arm: by the scenario its weight presses on the belt below joint 1 with {expected_n:.1} N, more than the force cell measures (converters.force.range_n = {range_n}); check link_mass_kg and the springs, or take another cell"
+    )]
+    TooHeavy {
+        /// Force expected from the weight, N.
+        expected_n: f64,
+        /// Range of the force cell, N.
+        range_n: f64,
     },
     /// The tip is not at the requested position.
     #[error(

@@ -10,7 +10,7 @@ use painleve_shared::{Arm, JointTorque, LinkMotion};
 
 use crate::encoders::EncodersFound;
 use crate::readings::Session;
-use crate::{CommissionError, Deviation, Mistake, OperatorTask, Rig};
+use crate::{CommissionError, Deviation, Expected, Mistake, OperatorTask, Rig};
 
 /// Largest error of the belt's height that counts as the scenario's own, m: 0.5° of each encoder's zero.
 const HEIGHT_TOLERANCE_M: f64 = 0.005;
@@ -67,6 +67,28 @@ pub(crate) fn force_at_rest_n(
     Some(inverse * (load_nm - torque_nm.to_links()).vector())
 }
 
+/// Checks that the force cell can measure the arm's weight as the scenario tells it, before anybody holds the arm.
+///
+/// # Errors
+/// [`Mistake::TooLight`] or [`Mistake::TooHeavy`].
+pub(crate) fn check(expected: &Expected) -> Result<(), Mistake> {
+    let range_n = f64::from(expected.converters.force.range);
+    let theta_rad = expected.arm.link_angles_on_belt_rad(0.0, expected.posture);
+    let force_n =
+        theta_rad.and_then(|it| force_at_rest_n(&expected.arm, &it, JointTorque::zeros()));
+    let expected_n = force_n.map_or(0.0, |it| it.y);
+    if expected_n < LEAST_N.max(LEAST_SHARE * range_n) {
+        return Err(Mistake::TooLight { expected_n });
+    }
+    if expected_n > LIMIT * range_n {
+        return Err(Mistake::TooHeavy {
+            expected_n,
+            range_n,
+        });
+    }
+    Ok(())
+}
+
 /// Measures height and weight.
 pub(crate) fn measure<R: Rig>(
     session: &mut Session<'_, R>,
@@ -104,10 +126,6 @@ pub(crate) fn measure<R: Rig>(
     let net_n = session.net_force_n(readings.forces, encoders.tare);
     let expected_n =
         force_at_rest_n(&expected.arm, &theta_rad, JointTorque::zeros()).map_or(0.0, |it| it.y);
-    let range_n = f64::from(expected.converters.force.range);
-    if expected_n < LEAST_N.max(LEAST_SHARE * range_n) {
-        return Err(Mistake::TooLight { expected_n }.into());
-    }
     let most = f64::from(expected.converters.force.maximum_counts());
     if readings.forces.iter().any(|it| it.abs() > LIMIT * most) {
         return Err(Mistake::ForceLimit { expected_n }.into());

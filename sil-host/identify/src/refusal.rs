@@ -89,7 +89,7 @@ pub enum Refusal {
     },
     /// The tip pressed too hard, and the slide was ended.
     #[error(
-        "slide {}: the tip pressed on the belt with {most_n:.0} N or more, and the torque was taken off; see what it catches on, and check masses and springs in arm_model",
+        "slide {}: the tip pressed on the belt with {most_n:.0} N or more, and the torque was taken off; see what it catches on, and check the masses and springs that the scenario tells of the arm",
         .slide + 1
     )]
     PressedTooHard {
@@ -100,7 +100,7 @@ pub enum Refusal {
     },
     /// The tip moved too fast, and the slide was ended.
     #[error(
-        "slide {}: the tip moved faster than {most_m_s} m/s, and the torque was taken off; see whether the tip is on the belt and what throws it, and check masses and springs in arm_model",
+        "slide {}: the tip moved faster than {most_m_s} m/s, and the torque was taken off; see whether the tip is on the belt and what throws it, and check controller.torque_limit_nm and the masses and springs that the scenario tells of the arm",
         .slide + 1
     )]
     MovedTooFast {
@@ -122,7 +122,7 @@ pub enum Refusal {
     },
     /// The tip was in the air.
     #[error(
-        "slide {}: the tip was on the belt in {percent:.0} % of the readings only (f_n of {contact_n} N or more); press it down, and check the force cell",
+        "slide {}: the tip was on the belt in {percent:.0} % of the readings only (f_n of {contact_n} N or more); press it down, and check the force cell and controller.torque_limit_nm",
         .slide + 1
     )]
     NotOnBelt {
@@ -146,7 +146,9 @@ pub enum Refusal {
         percent: f64,
     },
     /// Too little motion.
-    #[error("the tip slid by {slid_mm:.0} mm, less than {least_mm:.0} mm")]
+    #[error(
+        "the tip slid by {slid_mm:.0} mm only, less than {least_mm:.0} mm: see what holds it, and check the masses and belt.friction, by which the governor may stop it"
+    )]
     TooShort {
         /// Distance, mm.
         slid_mm: f64,

@@ -30,6 +30,17 @@ fn a_rehearsal_writes_what_it_has_found() {
             "{found}"
         );
     }
+    let of_plant = [
+        "drive",
+        "out/rehearsed/identified.toml",
+        "--port",
+        "/dev/null",
+        "--set",
+        "arm.tip_mass_kg=0.1",
+    ];
+    let without_effect = errors(&bench.run(&of_plant));
+    let reason = "--set arm.tip_mass_kg=0.1 has no effect on a real arm";
+    assert!(without_effect.contains(reason), "{without_effect}");
     let differences = bench.report(&[
         "diff",
         "hybrid-elbow-down",

@@ -50,6 +50,9 @@ pub enum BoardRigError {
     /// A slide has begun, but not ended.
     #[error("the slide has begun, but has not ended within {} s", .0.as_secs())]
     NotEnded(Duration),
+    /// Nobody can confirm a task.
+    #[error("standard input has ended: nobody can confirm that a task is done")]
+    NoInput,
     /// The stages went off.
     #[error("the torque stages went off: the switch was opened, or a sensor or a stage failed")]
     Off,
@@ -59,8 +62,11 @@ pub enum BoardRigError {
 }
 
 impl From<Ended> for BoardRigError {
-    fn from(_: Ended) -> Self {
-        Self::Interrupted
+    fn from(ended: Ended) -> Self {
+        match ended {
+            Ended::ByOperator => Self::Interrupted,
+            Ended::NoInput => Self::NoInput,
+        }
     }
 }
 

@@ -111,6 +111,7 @@ impl DriveReport {
 pub fn run(arguments: &DriveArguments) -> Result<(), CommandError> {
     let scenario = Scenario::load(&arguments.scenario, &arguments.overrides)?;
     check_rate(&scenario)?;
+    check_overrides(&scenario, &arguments.overrides)?;
     if arguments.store || arguments.stored || arguments.forget {
         return stored::run(arguments, &scenario);
     }
@@ -338,6 +339,20 @@ pub(crate) fn check_not_rehearsed(scenario: &Scenario) -> Result<(), InputError>
         return Err(InputError::Rehearsed(scenario.knowledge.source.clone()));
     }
     Ok(())
+}
+
+/// Refuses overrides of `arm`, which describes a simulated one, if the controller has a model of its own.
+///
+/// # Errors
+/// [`InputError::OfSimulatedArm`].
+pub(crate) fn check_overrides(scenario: &Scenario, overrides: &[String]) -> Result<(), InputError> {
+    let of_arm = overrides.iter().find(|it| it.starts_with("arm."));
+    match of_arm {
+        Some(of_arm) if scenario.arm_model.is_some() => {
+            Err(InputError::OfSimulatedArm(of_arm.clone()))
+        }
+        _ => Ok(()),
+    }
 }
 
 /// Tells the operator of an arm with one sensor on each channel what the board cannot detect within two ticks.

@@ -40,7 +40,8 @@ impl OperatorCommand {
     fn confirms(self) -> Result<bool, Ended> {
         let unknown = match self {
             Self::Confirm => return Ok(true),
-            Self::Stop | Self::Disarm | Self::End => return Err(Ended),
+            Self::Stop | Self::Disarm => return Err(Ended::ByOperator),
+            Self::End => return Err(Ended::NoInput),
             Self::Arm => "arm".to_owned(),
             Self::Unknown(text) => text,
         };
@@ -51,9 +52,14 @@ impl OperatorCommand {
     }
 }
 
-/// The operator has ended a procedure.
+/// Why a procedure has ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Ended;
+pub enum Ended {
+    /// The operator has ended it.
+    ByOperator,
+    /// Standard input has ended: nobody can confirm a task.
+    NoInput,
+}
 
 /// Reads commands without blocking the drive.
 pub struct Operator(Receiver<OperatorCommand>);
@@ -149,10 +155,10 @@ mod tests {
     #[test]
     fn a_task_ends_with_the_operator_but_not_what_needs_none() {
         let left = typed(b"");
-        assert_eq!(left.confirms(), Err(Ended));
+        assert_eq!(left.confirms(), Err(Ended::NoInput));
         assert_eq!(left.attend(), Ok(()));
         for end in ["stop\n", "disarm\n"] {
-            assert_eq!(typed(end.as_bytes()).confirms(), Err(Ended));
+            assert_eq!(typed(end.as_bytes()).confirms(), Err(Ended::ByOperator));
         }
     }
 
@@ -166,6 +172,6 @@ mod tests {
         pass_on(&b"\n"[..], &sender);
         assert_eq!(operator.confirms(), Ok(true));
         pass_on(&b"\n\nstop\n\n"[..], &sender);
-        assert_eq!(operator.attend(), Err(Ended));
+        assert_eq!(operator.attend(), Err(Ended::ByOperator));
     }
 }

@@ -27,7 +27,7 @@ use serde_json::json;
 
 use self::board_slides::BoardSlides;
 use self::recorded::Recorded;
-use super::drive::{check_not_rehearsed, check_rate};
+use super::drive::{check_not_rehearsed, check_overrides, check_rate};
 use super::output::{default_output, warn_of_earlier};
 use super::output_error::{InputError, output};
 use super::{CommandError, distinct_files, say};
@@ -186,6 +186,7 @@ fn found(
     if let Some(port) = &arguments.port {
         check_rate(scenario)?;
         check_not_rehearsed(scenario)?;
+        check_overrides(scenario, &arguments.overrides)?;
         if is_new(scenario) {
             return Err(InputError::NotCommissioned.into());
         }

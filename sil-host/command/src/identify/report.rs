@@ -12,6 +12,9 @@ use serde_json::{Value, json};
 
 use super::residuals;
 
+/// Part by which the friction on the belt differs from the scenario's if this is told.
+const OTHER_FRICTION: f64 = 0.1;
+
 /// A table for readers.
 struct Table {
     header: [&'static str; 4],
@@ -91,6 +94,8 @@ pub fn json(found: &Found) -> Value {
         "parameters": parameters,
         "joints": found.joints.joints.map(of_joint),
         "force_cells": found.joints.cells.map(of_cell),
+        "friction": found.friction,
+        "further_tilt_rad": of(found.joints.tilt_rad),
         "torque_left_over_nm": found.joints.left_over_nm,
         "tip_deviation_m": identified.tip_deviation_m,
         "tip_deviation_before_m": found.prior.tip_deviation_m(),
@@ -98,6 +103,7 @@ pub fn json(found: &Found) -> Value {
         "off_line_m": identified.off_line_m,
         "ripple_m_s2": found.ripple_m_s2,
         "readings": identified.readings,
+        "sentences": sentences(found),
     })
 }
 
@@ -106,13 +112,14 @@ fn sentences(found: &Found) -> Vec<String> {
     let [off_before_m, off_after_m] = identified.off_line_m;
     let of_torques = match found.joints.left_over_nm {
         Some([before_nm, after_nm]) => format!(
-            "The arm's model explains the torques to {:.0} mN·m (by the values before: {:.0} mN·m).",
+            "The arm's model explains the torques to {:.0} mN·m (with the friction and springs known before: {:.0} mN·m).",
             1e3 * after_nm,
             1e3 * before_nm
         ),
         None => "The torques show nothing of friction and springs: in no tenth of a second has a joint turned far enough in one direction with the tip on the belt. What the scenario says of them stays."
             .into(),
     };
+    let tilt = found.joints.tilt_rad;
     let length = identified.fit.parameters.get(Parameter::Length);
     let length_deviation = identified.fit.deviation(Parameter::Length) / length;
     let mut sentences = vec![
@@ -136,7 +143,18 @@ fn sentences(found: &Found) -> Vec<String> {
              controller.governor.p_per_kg follows.",
             found.ripple_m_s2
         ),
+        format!(
+            "The belt is tilted by {} mrad more than belt_tilt_rad says; a level shows this better than slides do.",
+            spread(1e3 * tilt.value, 1e3 * tilt.deviation, 0)
+        ),
     ];
+    let told = found.told_friction;
+    if (found.friction / told - 1.0).abs() > OTHER_FRICTION {
+        sentences.push(format!(
+            "The friction coefficient of the tip on the belt is {:.2} by the slides, but {told:.2} in the scenario: set belt.friction, of which the place to set the tip down follows.",
+            found.friction
+        ));
+    }
     for (joint, name) in found.joints.joints.iter().zip(JOINT_NAMES) {
         if joint.drives_itself() {
             sentences.push(format!(

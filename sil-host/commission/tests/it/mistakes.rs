@@ -103,6 +103,18 @@ fn is_named(scenario: &Scenario, mistake: BuiltInMistake, seed: u64) -> Result<(
         .ok_or(format!("seed {seed}, {}: {messages:?}", mistake.name()))
 }
 
+/// Masses in grams, and a force cell that is too small.
+#[test]
+fn a_weight_that_no_cell_measures_is_told_before_anybody_holds_the_arm() {
+    for key in ["arm.link_mass_kg=[120, 120]", "converters.force.range_n=3"] {
+        let overrides = [key.to_owned()];
+        let scenario = Scenario::default().with_overrides("heavy", &overrides);
+        let refusal = commissioned(&scenario.unwrap(), None, 1).unwrap_err();
+        let expected = "more than the force cell measures (converters.force.range_n = ";
+        assert!(refusal.contains(expected), "{key}: {refusal}");
+    }
+}
+
 #[test]
 fn every_built_in_mistake_is_found_and_named() {
     for mistake in BuiltInMistake::ALL {

@@ -60,6 +60,8 @@ pub fn run<P: Plant>(
     let mut alarms = FalseAlarms::default();
     let mut smoothness = Smoothness::new(f64::from(scenario.run.tick_hz));
     let (mut of_target_m, mut of_governed_m) = (0.0_f64, 0.0_f64);
+    let (mut sum_m, mut count, mut governed) = (0.0, 0.0, None);
+    let mut stands = true;
     let mut solved = true;
     for _ in 0..scenario.run.ticks() {
         if trial.tick(&mut contact).is_err() {
@@ -74,6 +76,12 @@ pub fn run<P: Plant>(
             // Without a target, the tip is where it should be if it is at the reference.
             of_target_m = of_target_m.max((tip_m - target_m.unwrap_or(governed_m)).abs());
             of_governed_m = of_governed_m.max((tip_m - governed_m).abs());
+            sum_m += tip_m - governed_m;
+            count += 1.0;
+            let reference = trial.answer().reference_tip;
+            stands &= governed
+                .replace(reference)
+                .is_none_or(|before| before == reference);
         }
     }
     let bits = i32::from(scenario.converters.encoder.bits);
@@ -123,6 +131,7 @@ pub fn run<P: Plant>(
         lift_offs: contact.lift_offs,
         first_lift_off_s: contact.first_lift_off_s,
         error_m: of_governed_m,
+        resting_error_m: (stands && count > 0.0).then(|| f64::abs(sum_m / count)),
         tolerance_m,
         to_edge_m,
         p_ratio,

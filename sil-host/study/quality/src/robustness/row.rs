@@ -82,6 +82,9 @@ pub struct Row {
     pub first_lift_off_s: Option<f64>,
     /// Largest final distance from the governed reference, m.
     pub error_m: f64,
+    /// Final distance of the tip from a reference that stands, on average over the time, m; absent where the governor
+    /// moves it.
+    pub resting_error_m: Option<f64>,
     /// Tolerance of the final distance, m.
     pub tolerance_m: f64,
     /// Distance of the tip from the edge p = 0 or the usable reach ahead, m.

@@ -19,6 +19,7 @@ pub(super) fn row(index: usize, ending: Ending, error_m: f64) -> Row {
         lift_offs: u64::from(ending == Ending::LiftOff),
         first_lift_off_s: (ending == Ending::LiftOff).then_some(1.5),
         error_m,
+        resting_error_m: Some(error_m),
         tolerance_m: 1e-3,
         to_edge_m: 0.05,
         p_ratio: 0.6,
