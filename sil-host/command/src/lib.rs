@@ -384,6 +384,11 @@ fn seconds(text: &str) -> Result<f64, String> {
     number(text, 0.0..=86_400.0, "seconds")
 }
 
+/// Parses a port of this machine.
+fn port(text: &str) -> Result<u16, String> {
+    number(text, 0..=u16::MAX, "a port")
+}
+
 /// Parses a number of things.
 fn count(text: &str) -> Result<NonZeroUsize, String> {
     let count = number(text, 1..=1_000_000, "a whole number")?;

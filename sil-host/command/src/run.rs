@@ -104,6 +104,7 @@ pub struct RunArguments {
     /// Watch and steer the run from a page in the browser or from Foxglove, on this machine. It runs
     /// in one process, writes no files, and continues until Ctrl-C.
     #[arg(long, value_name = "PORT", num_args = 0..=1, default_missing_value = "8765")]
+    #[arg(value_parser = super::port)]
     #[arg(conflicts_with_all = ["bus", "port", "fail_on", "record", "plot", "html", "csv"])]
     #[arg(conflicts_with_all = ["no_record", "no_plot", "no_html"])]
     #[arg(conflicts_with_all = ["timing", "verbose", "quiet", "json", "pacing", "silence_limit_s"])]

@@ -11,6 +11,7 @@ use painleve_files::input_file;
 use painleve_plant::scenario::Scenario;
 use painleve_process::interrupt::Interrupt;
 use painleve_process::terminal::{self, warn};
+use painleve_study_core::options::number;
 use painleve_study_quality::tuning::{BATCH, Range, Score, Trial, Tuning, svg};
 use serde_json::json;
 
@@ -31,10 +32,10 @@ pub struct TuneArguments {
     #[arg(long = "set", value_name = "KEY=VALUE")]
     overrides: Vec<String>,
     /// Number of trials.
-    #[arg(long, value_name = "N", default_value_t = 120, value_parser = clap::value_parser!(u32).range(8..=100_000))]
+    #[arg(long, value_name = "N", default_value_t = 120, value_parser = |text: &str| number(text, 8_u32..=100_000, "a whole number"))]
     trials: u32,
     /// Cases of a trial: other friction, other masses than the controller's model has, other noise.
-    #[arg(long, value_name = "N", default_value_t = 4, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    #[arg(long, value_name = "N", default_value_t = 4, value_parser = |text: &str| number(text, 1_u32..=1000, "a whole number"))]
     cases: u32,
     /// Seed of search and cases.
     #[arg(long, default_value_t = 1, value_parser = painleve_study_core::options::seed)]

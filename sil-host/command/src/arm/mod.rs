@@ -16,6 +16,7 @@ use painleve_plant::mechanics::compliant::{ContactKind, TipContact};
 use painleve_plant::scenario::{InitialState, Scenario};
 use painleve_process::terminal::warn;
 use painleve_shared::ArmParameters;
+use painleve_study_core::options::number;
 
 use super::output_error::InputError;
 use super::{CommandError, say};
@@ -31,7 +32,7 @@ pub struct ArmArguments {
     #[arg(long, value_name = "NAME|X,Y,Z", allow_hyphen_values = true)]
     tip: Option<Tip>,
     /// Distance of the first joint from the belt, m; 0.9 of the arm's reach if absent.
-    #[arg(long, value_name = "M")]
+    #[arg(long, value_name = "M", value_parser = |text: &str| number(text, 1e-4..=20.0, "metres"))]
     height_m: Option<f64>,
 }
 

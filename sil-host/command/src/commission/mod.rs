@@ -16,6 +16,7 @@ use painleve_plant::decimal::as_written;
 use painleve_plant::scenario::{Knowledge, Scenario, ScenarioError, built_in};
 use painleve_shared::mounting::SensorParts;
 use painleve_shared::range::OutOfRange;
+use painleve_study_core::options::number;
 use painleve_study_core::outcome::quoted;
 use serde_json::json;
 
@@ -58,7 +59,7 @@ pub struct CommissionArguments {
     seed: Option<u64>,
     /// Largest torque on either joint, N·m; by default, a fifth of the torque stages' range, or controller.torque_limit_nm
     /// if that is less.
-    #[arg(long, value_name = "N·m")]
+    #[arg(long, value_name = "N·m", value_parser = torque_nm)]
     torque_limit_nm: Option<f64>,
     /// File for the corrected scenario; by default out/commissioned.toml, and out/rehearsed/commissioned.toml with --rehearse.
     #[arg(long, value_name = "PATH")]
@@ -73,6 +74,11 @@ const DEFAULT_SHARE: f64 = 0.2;
 
 /// Highest control rate while commissioning, Hz: the line carries the readings of every tick.
 const FASTEST_HZ: u32 = 1000;
+
+/// Reads a torque; its limits depend on the stages.
+fn torque_nm(text: &str) -> Result<f64, String> {
+    number(text, 0.0..=1e4, "newton metres")
+}
 
 fn mistakes() -> clap::builder::PossibleValuesParser {
     BuiltInMistake::ALL

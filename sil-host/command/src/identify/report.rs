@@ -139,7 +139,7 @@ fn sentences(found: &Found) -> Vec<String> {
         ),
         of_torques,
         format!(
-            "Waves, vibration and unknown torques accelerate the tip off the belt by {:.2} m/s² (root mean square), of which \
+            "Waves, vibration, unknown torques and the force cell's noise pass for accelerations of the tip off the belt of {:.2} m/s² (root mean square), of which \
              controller.governor.p_per_kg follows.",
             found.ripple_m_s2
         ),

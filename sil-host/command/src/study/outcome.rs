@@ -10,6 +10,7 @@ use painleve_chart::picture;
 use painleve_files::atomic_file::{commit_all, prepare};
 use painleve_study_core::Study;
 use painleve_study_core::catalogue::{AnyOutcome, AnyStudy};
+use painleve_study_core::options::number;
 
 use crate::output_error::output;
 use crate::process_error::ProcessError;
@@ -39,7 +40,7 @@ pub struct OutcomeOptions {
 #[derive(Clone, Debug, Args)]
 pub struct Threads {
     /// Number of threads; all cores by default. The result does not depend on it.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    #[arg(long, value_name = "N", value_parser = |text: &str| number(text, 1_u16..=1024, "a whole number"))]
     threads: Option<u16>,
 }
 

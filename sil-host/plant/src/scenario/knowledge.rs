@@ -30,11 +30,11 @@ settings! {
         /// Distance of the tip from a straight line in the slides, root mean square.
         off_line_m: f64 = 0.0, 0.0..=1.0, "m";
         /// Acceleration of the tip off the belt by waves, vibration and torques that the controller does not know, root mean
-        /// square in the slides. `controller.governor.p_per_kg` follows from it.
+        /// square in the slides; the force cell's noise adds to it. `controller.governor.p_per_kg` follows from it.
         ripple_m_s2: f64 = 0.0, 0.0..=1e6, "m/s²";
-        /// Standard deviation of each joint's Coulomb friction.
+        /// Standard deviation of each joint's Coulomb friction; 0 if no slide has shown it.
         coulomb_friction_nm: [f64; 2] = [0.0; 2], 0.0..=1e4, "N·m";
-        /// Standard deviation of the stiffness of the spring in each joint.
+        /// Standard deviation of the stiffness of the spring in each joint; 0 if no slide has shown it.
         stiffness_nm_rad: [f64; 2] = [0.0; 2], 0.0..=1e6, "N·m/rad";
     }
 }

@@ -6,7 +6,7 @@ use painleve_plant::mechanics::compliant::ContactKind;
 use super::{LoopMargins, LoopOutcome, Row};
 use painleve_study_core::catalogue::{InShards, StudyOptions, in_shards};
 use painleve_study_core::grid::once;
-use painleve_study_core::options::{ControllerOptions, Overrides, PostureOption};
+use painleve_study_core::options::{ControllerOptions, Overrides, PostureOption, number};
 use painleve_study_core::{Grid, Study, StudyError};
 
 /// The sampled loop in the frequency domain: Bode plots, margins and steps along the belt.
@@ -31,7 +31,7 @@ pub struct Options {
         long,
         value_name = "N",
         default_value_t = 20,
-        value_parser = clap::value_parser!(u16).range(2..=200)
+        value_parser = |text: &str| number(text, 2_u16..=200, "a whole number")
     )]
     frequencies: u16,
     #[command(flatten)]
