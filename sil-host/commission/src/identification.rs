@@ -296,6 +296,7 @@ pub fn identify_arm<R: SlideRig>(
     let prior = prior(scenario, drawn);
     let limits = limits(scenario);
     let first = posture(scenario)?;
+    let tick_hz = f64::from(scenario.run.tick_hz);
     let mut slides = Vec::new();
     let mut slide = |known: &Scenario, share: f64, postures: [Posture; 2]| {
         for posture in postures {
@@ -313,8 +314,15 @@ pub fn identify_arm<R: SlideRig>(
                 let slide = slide_of(scenario, posture, slid.ticks, whole);
                 let belt_m_s = program.belt.profile.speed_m_s(0.0);
                 if let Some(surprise) = surprise {
+                    // A tip that was thrown at once shows no friction.
+                    let slid_s = slide.on_belt(&limits).count() as f64 / tick_hz;
+                    let has_slid = slid_s >= MEAN_S;
+                    let of_friction = || {
+                        let checked = check_friction(index, &slide, belt_m_s, &limits);
+                        checked.err().filter(|_| has_slid)
+                    };
                     let refusal = misread(index, &slide, &prior, &limits)
-                        .or_else(|| check_friction(index, &slide, belt_m_s, &limits).err())
+                        .or_else(of_friction)
                         .unwrap_or(surprise.refusal(index));
                     return Err(refusal.into());
                 }
