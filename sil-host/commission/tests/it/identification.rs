@@ -38,6 +38,9 @@ const FIRST_SEED: u64 = 7_003_000;
 /// Closed loops of each arm.
 const LOOPS: usize = 3;
 
+/// Part of the stages' limits, known to a fifth, that every stage gives: a controller that knows more asks for it in vain.
+const SURE_TORQUE: f32 = 0.8;
+
 /// How well the arms are known that [`imperfect`] draws: link 1 has been measured.
 fn drawn() -> Drawn {
     Drawn {
@@ -554,8 +557,7 @@ fn identified_arms_put_the_tip_where_they_say() {
             let mut actual = imperfect(&study.scenario(cell, run).unwrap(), seed).unwrap();
             // It throws the tip.
             actual.effects.surface.seam_height_m = 0.0;
-            // What every stage gives whose limit is known to a fifth.
-            actual.controller.torque_limit_nm *= 0.8;
+            actual.controller.torque_limit_nm *= SURE_TORQUE;
             // As by a plumb line, and by a careful operator, whose zeros are within 1°.
             for (part, judged) in [(1.0, &mut by_plumb_line), (1.0 / 3.0, &mut careful)] {
                 let mut told = actual.clone();

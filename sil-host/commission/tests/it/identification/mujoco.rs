@@ -15,7 +15,7 @@ use painleve_study_quality::proportion::Proportion;
 use painleve_study_quality::robustness;
 
 use super::mujoco_arm::{MujocoArm, python};
-use super::{describe, identified_on, loops, within_deviations};
+use super::{SURE_TORQUE, describe, identified_on, loops, within_deviations};
 
 const FIRST_SEED: u64 = 7_004_000;
 
@@ -45,7 +45,8 @@ fn identified_arms(plant_of: PlantOf<MujocoArm>) -> (Proportion, Percentiles) {
         let (right, all) = within_deviations(&scenario, seed, &found);
         inside += right;
         parameters += all;
-        let actual = imperfect(&scenario, seed).unwrap();
+        let mut actual = imperfect(&scenario, seed).unwrap();
+        actual.controller.torque_limit_nm *= SURE_TORQUE;
         let known = found.applied_to(&actual, "").unwrap();
         let row = robustness::run_on(plant_of(&known).unwrap(), arm, &known).unwrap();
         println!(
