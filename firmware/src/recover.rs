@@ -28,6 +28,9 @@ const DEEPEST_M: f32 = 0.03;
 /// Factor on the landing speed below the assumed belt: a tip that gets there shows that the links are
 /// shorter. Slower, and raised without limit, fewer captures succeeded (lab book, *Constants that are not needed*).
 const SEARCHING: f32 = 4.0;
+/// Speed at which the landing point moves along the belt to the admissible stretch, as a multiple of the landing speed. At
+/// once, a tip was thrown along the belt at 0.4 m/s and more (lab book, *The way to the landing point*).
+const TRAVEL: f32 = 25.0;
 /// Rate at which the landing point moves inwards while the path is out of reach, 1/s.
 const INWARDS_PER_S: f32 = 0.5;
 /// Rate at which the path moves on while friction of the joints holds the tip short of its landing point, 1/s.
@@ -108,10 +111,12 @@ impl RecoverySettings {
         if rests {
             flight.landing_m = model.tip_m.x;
         }
-        if let Some(Stretch { lower_m, upper_m }) = stretch {
-            flight.landing_m = flight.landing_m.limited(lower_m, upper_m);
-        }
-        let away = flight.landing_m - model.tip_m.x;
+        let place_m = stretch.map_or(flight.landing_m, |Stretch { lower_m, upper_m }| {
+            flight.landing_m.limited(lower_m, upper_m)
+        });
+        let most_m = TRAVEL * self.landing_speed_m_s * tick_s;
+        flight.landing_m += (place_m - flight.landing_m).within(most_m);
+        let away = place_m - model.tip_m.x;
         if rests {
             let onwards_m = ONWARDS_PER_S * tick_s * away;
             flight.beyond_m = (flight.beyond_m + onwards_m).within(FARTHEST_BEYOND_M);
@@ -189,6 +194,32 @@ mod tests {
             assert_eq!(flight.posture, Posture::ElbowDown);
         }
         assert!((0..11).any(|_| state.as_mut().unwrap().touch(1e-3)));
+    }
+
+    #[test]
+    fn the_way_to_a_far_landing_point_is_slow() {
+        let arm = Arm::<f32>::new(ArmParameters::default()).unwrap();
+        let theta = arm
+            .link_angles_on_belt_rad(0.1, Posture::ElbowDown)
+            .unwrap();
+        let model = Model::new(
+            &arm,
+            theta,
+            LinkMotion::new(0.3, 0.3),
+            &GeneralisedTorque::zeros(),
+        );
+        let stretch = Stretch {
+            lower_m: -0.1,
+            upper_m: -0.05,
+        };
+        let mut flight = None;
+        let mut moved_m = 0.0;
+        for tick in 1..=100_u16 {
+            RecoverySettings::default().tick(&mut flight, &arm, &model, Some(stretch), 1e-3);
+            moved_m = 0.1 - flight.unwrap().landing_m;
+            assert!(moved_m < 5.1e-4 * f32::from(tick), "{tick}: {moved_m}");
+        }
+        assert!(moved_m > 0.045, "{moved_m}");
     }
 
     /// Returns the acceleration (m/s²) with which the recovery presses the tip down after `ticks` in which the belt
