@@ -28,9 +28,9 @@ const DEEPEST_M: f32 = 0.03;
 /// Factor on the landing speed below the assumed belt: a tip that gets there shows that the links are
 /// shorter. Slower, and raised without limit, fewer captures succeeded (lab book, *Constants that are not needed*).
 const SEARCHING: f32 = 4.0;
-/// Speed at which the landing point moves along the belt to the admissible stretch, as a multiple of the landing speed. At
-/// once, a tip was thrown along the belt at 0.4 m/s and more (lab book, *The way to the landing point*).
-const TRAVEL: f32 = 25.0;
+/// Speed at which the landing point moves along the belt to the admissible stretch, m/s. At once, a tip was thrown along the
+/// belt (lab book, *The way to the landing point*).
+const TRAVEL_M_S: f32 = 0.5;
 /// Rate at which the landing point moves inwards while the path is out of reach, 1/s.
 const INWARDS_PER_S: f32 = 0.5;
 /// Rate at which the path moves on while friction of the joints holds the tip short of its landing point, 1/s.
@@ -111,20 +111,21 @@ impl RecoverySettings {
         if rests {
             flight.landing_m = model.tip_m.x;
         }
-        let place_m = stretch.map_or(flight.landing_m, |Stretch { lower_m, upper_m }| {
-            flight.landing_m.limited(lower_m, upper_m)
-        });
-        let most_m = TRAVEL * self.landing_speed_m_s * tick_s;
-        flight.landing_m += (place_m - flight.landing_m).within(most_m);
-        let away = place_m - model.tip_m.x;
+        let mut away = flight.landing_m - model.tip_m.x;
+        flight.lands = if let Some(Stretch { lower_m, upper_m }) = stretch {
+            let place_m = flight.landing_m.limited(lower_m, upper_m);
+            flight.landing_m += (place_m - flight.landing_m).within(TRAVEL_M_S * tick_s);
+            let tip_m = model.tip_m.x;
+            away = place_m - tip_m;
+            away.abs() < OVER_LANDING_PLACE_M
+                || (flight.lands && tip_m > lower_m && tip_m < upper_m)
+        } else {
+            false
+        };
         if rests {
             let onwards_m = ONWARDS_PER_S * tick_s * away;
             flight.beyond_m = (flight.beyond_m + onwards_m).within(FARTHEST_BEYOND_M);
         }
-        flight.lands = stretch.is_some_and(|Stretch { lower_m, upper_m }| {
-            let admissible = model.tip_m.x > lower_m && model.tip_m.x < upper_m;
-            away.abs() < OVER_LANDING_PLACE_M || (flight.lands && admissible)
-        });
         // Descend faster at greater height, and at landing speed close to the belt.
         let down_m_s = if flight.height_m < 0.0 {
             SEARCHING * self.landing_speed_m_s
