@@ -174,18 +174,19 @@ mod tests {
     use painleve_shared::{ArmParameters, GeneralisedTorque, JointTorque};
     use proptest::prelude::*;
 
-    #[test]
-    fn only_a_contact_that_lasts_ends_a_recovery() {
-        let arm = Arm::<f32>::new(ArmParameters::default()).unwrap();
-        let theta = arm
+    /// Returns an arm, and its model with the tip on the belt at 0.1 m and the links turning at these rates.
+    fn at_a_tenth_of_a_metre(theta_dot_rad_s: LinkMotion<f32>) -> (Arm<f32>, Model) {
+        let arm = Arm::new(ArmParameters::default()).unwrap();
+        let theta_rad = arm
             .link_angles_on_belt_rad(0.1, Posture::ElbowDown)
             .unwrap();
-        let model = Model::new(
-            &arm,
-            theta,
-            LinkMotion::zeros(),
-            &GeneralisedTorque::zeros(),
-        );
+        let still = GeneralisedTorque::zeros();
+        (arm, Model::new(&arm, theta_rad, theta_dot_rad_s, &still))
+    }
+
+    #[test]
+    fn only_a_contact_that_lasts_ends_a_recovery() {
+        let (arm, model) = at_a_tenth_of_a_metre(LinkMotion::zeros());
         let recovery = RecoverySettings::default();
         let mut state = None;
         for _ in 0..10 {
@@ -199,16 +200,7 @@ mod tests {
 
     #[test]
     fn the_way_to_a_far_landing_point_is_slow() {
-        let arm = Arm::<f32>::new(ArmParameters::default()).unwrap();
-        let theta = arm
-            .link_angles_on_belt_rad(0.1, Posture::ElbowDown)
-            .unwrap();
-        let model = Model::new(
-            &arm,
-            theta,
-            LinkMotion::new(0.3, 0.3),
-            &GeneralisedTorque::zeros(),
-        );
+        let (arm, model) = at_a_tenth_of_a_metre(LinkMotion::new(0.3, 0.3));
         let stretch = Stretch {
             lower_m: -0.1,
             upper_m: -0.05,
