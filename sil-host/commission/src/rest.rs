@@ -72,8 +72,14 @@ pub(crate) fn force_at_rest_n(
 /// # Errors
 /// [`Mistake::TooLight`] or [`Mistake::TooHeavy`].
 pub(crate) fn check(expected: &Expected) -> Result<(), Mistake> {
-    let range_n = f64::from(expected.converters.force.range);
     let theta_rad = expected.arm.link_angles_on_belt_rad(0.0, expected.posture);
+    weight_n(expected, theta_rad).map(|_| ())
+}
+
+/// Returns the force (N) with which the arm's weight should press on the belt at these angles (rad), if the force cell can
+/// measure it.
+fn weight_n(expected: &Expected, theta_rad: Option<LinkMotion<f64>>) -> Result<f64, Mistake> {
+    let range_n = f64::from(expected.converters.force.range);
     let force_n =
         theta_rad.and_then(|it| force_at_rest_n(&expected.arm, &it, JointTorque::zeros()));
     let expected_n = force_n.map_or(0.0, |it| it.y);
@@ -86,7 +92,7 @@ pub(crate) fn check(expected: &Expected) -> Result<(), Mistake> {
             range_n,
         });
     }
-    Ok(())
+    Ok(expected_n)
 }
 
 /// Measures height and weight.
@@ -124,8 +130,7 @@ pub(crate) fn measure<R: Rig>(
         deviations.push(Deviation::BeltHeight { error_m });
     }
     let net_n = session.net_force_n(readings.forces, encoders.tare);
-    let expected_n =
-        force_at_rest_n(&expected.arm, &theta_rad, JointTorque::zeros()).map_or(0.0, |it| it.y);
+    let expected_n = weight_n(expected, Some(theta_rad))?;
     let most = f64::from(expected.converters.force.maximum_counts());
     if readings.forces.iter().any(|it| it.abs() > LIMIT * most) {
         return Err(Mistake::ForceLimit { expected_n }.into());
