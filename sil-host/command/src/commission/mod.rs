@@ -23,7 +23,7 @@ use serde_json::json;
 use self::board_rig::BoardRig;
 pub use self::board_rig::BoardRigError;
 use self::rehearsal::Rehearsal;
-use super::drive::{check_not_rehearsed, check_rate};
+use super::drive::{check_not_rehearsed, check_overrides, check_rate};
 use super::output::{default_output, warn_of_earlier};
 use super::output_error::{InputError, output};
 use super::{CommandError, distinct_files, say};
@@ -59,7 +59,7 @@ pub struct CommissionArguments {
     seed: Option<u64>,
     /// Largest torque on either joint, N·m; by default, a fifth of the torque stages' range, or controller.torque_limit_nm
     /// if that is less.
-    #[arg(long, value_name = "N·m", value_parser = torque_nm)]
+    #[arg(long, value_name = "N·m", value_parser = |text: &str| number(text, 0.0..=1e4, "newton metres"))]
     torque_limit_nm: Option<f64>,
     /// File for the corrected scenario; by default out/commissioned.toml, and out/rehearsed/commissioned.toml with --rehearse.
     #[arg(long, value_name = "PATH")]
@@ -74,11 +74,6 @@ const DEFAULT_SHARE: f64 = 0.2;
 
 /// Highest control rate while commissioning, Hz: the line carries the readings of every tick.
 const FASTEST_HZ: u32 = 1000;
-
-/// Reads a torque; its limits depend on the stages.
-fn torque_nm(text: &str) -> Result<f64, String> {
-    number(text, 0.0..=1e4, "newton metres")
-}
 
 fn mistakes() -> clap::builder::PossibleValuesParser {
     BuiltInMistake::ALL
@@ -103,6 +98,7 @@ pub fn run(arguments: &CommissionArguments) -> Result<(), CommandError> {
     check_rate(&scenario)?;
     if arguments.port.is_some() {
         check_not_rehearsed(&scenario)?;
+        check_overrides(&scenario, &arguments.overrides)?;
     }
     let as_written = scenario.clone();
     if tick_hz > FASTEST_HZ {
