@@ -246,10 +246,7 @@ impl Joints {
         deviations[ZEROS] = ZERO_N;
         deviations[ZEROS + 1] = ZERO_N;
         deviations[BELT] = TILT_RAD;
-        Ok(Self {
-            torque_nm,
-            ..Self::fitted(&equations, &deviations, known)
-        })
+        Ok(Self::fitted(&equations, &deviations, known))
     }
 
     /// Takes the parameters from the unknowns that solve the equations.
@@ -294,7 +291,8 @@ impl Joints {
             cells: solution.cells(),
             tilt_rad: solution.sum(&solution.unit(BELT)),
             left_over_nm: (!equations.is_empty()).then(|| [rms(&before), rms(&solution.unknowns)]),
-            torque_nm: 0.0,
+            // What is known of an offset beforehand is the size of the torques.
+            torque_nm: deviations[OFFSET],
         }
     }
 }

@@ -4,10 +4,9 @@
 
 use std::fmt::Write;
 
-use painleve_plant::closed_loop::ClosedLoop;
-use painleve_plant::controller_host::InProcess;
-use painleve_plant::scenario::{Scenario, built_in};
-use painleve_plant::simulation::Simulation;
+use painleve_plant::scenario::built_in;
+
+use crate::run;
 
 /// What exercises parts of the controller that the built-in scenarios do not: overrides of the scenario `edge`.
 const FURTHER: [(&str, &[&str]); 5] = [
@@ -44,16 +43,7 @@ fn runs_keep_their_bits() {
     let further = FURTHER.map(|(name, overrides)| (name, "edge", overrides));
     let mut hashes = String::new();
     for (name, scenario, overrides) in built_in.into_iter().chain(further) {
-        let overrides: Vec<String> = overrides.iter().map(ToString::to_string).collect();
-        let scenario =
-            Scenario::load(scenario, &overrides).unwrap_or_else(|error| panic!("{name}: {error}"));
-        let simulation = Simulation::new(&scenario).expect("a valid scenario");
-        let host = InProcess::new(&scenario.controller_configuration()).expect("a valid one");
-        let mut closed_loop = ClosedLoop::new(simulation, host);
-        for _ in 0..scenario.run.ticks() {
-            closed_loop.tick(&mut ()).expect("an answer");
-        }
-        let (end, _) = closed_loop.finish();
+        let end = run(scenario, overrides);
         writeln!(hashes, "{} {name}", end.log_hash.as_str()).expect("memory");
     }
     insta::assert_snapshot!(hashes);

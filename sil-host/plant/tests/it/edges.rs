@@ -1,21 +1,8 @@
 //! The governor knows the edges before a reference can pass them, for the posture that the arm has.
 
-use painleve_plant::closed_loop::{ClosedLoop, LoopResult};
-use painleve_plant::controller_host::InProcess;
-use painleve_plant::scenario::Scenario;
-use painleve_plant::simulation::Simulation;
 use painleve_shared::status::Fault;
 
-fn run(scenario: &str, overrides: &[&str]) -> LoopResult {
-    let overrides: Vec<String> = overrides.iter().map(ToString::to_string).collect();
-    let scenario = Scenario::load(scenario, &overrides).expect("a valid scenario");
-    let host = InProcess::new(&scenario.controller_configuration()).expect("a valid one");
-    let mut closed_loop = ClosedLoop::new(Simulation::new(&scenario).expect("a plant"), host);
-    for _ in 0..scenario.run.ticks() {
-        closed_loop.tick(&mut ()).expect("an answer");
-    }
-    closed_loop.finish().0
-}
+use crate::run;
 
 /// A reference that starts fast, before both edges have been found, and ends beyond one.
 #[test]
