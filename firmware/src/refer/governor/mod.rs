@@ -30,8 +30,8 @@ pub const USABLE_REACH: f32 = 0.995;
 const JUMP_M: f32 = 2e-3;
 /// A reference nearer than this, m, has been caught up with.
 const CAUGHT_M: f32 = 2e-5;
-/// What p lacks at a place whose distance reaches beyond the arm, for each metre from the middle and one more, 1/(kg·m): more than p lacks
-/// elsewhere, so that of such places the innermost counts as the best.
+/// Lack of p at a place from which the kept distance is out of reach, 1/(kg·m), times 1 m and its distance from the middle: more
+/// than anywhere else, so that of such places the innermost counts as the best.
 const OUT_OF_REACH_PER_KG_M: f32 = 1e9;
 /// Rate at which the remaining distance to a target decays, 1/s.
 const APPROACH_PER_S: f32 = 20.0;
