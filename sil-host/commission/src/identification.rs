@@ -44,6 +44,9 @@ const REST_S: f64 = 0.5;
 /// Ends of the slides of each round, as a part of the reach; the governor stops them earlier where it has to.
 const ROUNDS: [f64; 2] = [0.6, 0.93];
 
+/// Number of slides: one in each posture a round.
+pub const SLIDES: usize = 2 * ROUNDS.len();
+
 /// Least p of a slide, 1/kg: where a belt's vibration of 5 m/s² takes a fifth of the force.
 const LEAST_P_PER_KG: f64 = 6.0;
 
@@ -73,8 +76,8 @@ const DRAWN: &str = "drawn, zeros by plumb line";
 /// new value is better than the old one.
 const BETTER: f64 = 0.5;
 
-/// Normal forces of the attempts at a slide whose tip leaves the belt, N: torques that a badly known model takes for
-/// those of the arm may lift a tip that presses less.
+/// Normal forces of the attempts at a slide whose tip leaves the belt or is thrown along it, N: torques that a badly known
+/// model takes for those of the arm may lift a tip that presses less.
 const ATTEMPTS_N: [f64; 3] = [FORCE_N, 1.25 * FORCE_N, 1.5 * FORCE_N];
 
 /// An arm whose controller slides its tip, and its operator.
@@ -89,6 +92,11 @@ pub trait SlideRig {
     /// # Errors
     /// If the operator gives up, or the rig or its drive fails.
     fn slide(&mut self, scenario: &Scenario, posture: Posture) -> Result<Slid, Self::Error>;
+
+    /// Tells the operator why the last slide is repeated, with the tip pressed by `force_n` (N).
+    fn repeats(&mut self, reason: &Refusal, force_n: f64) {
+        let _ = (reason, force_n);
+    }
 }
 
 /// Reason for the end of an identification without a result.
@@ -283,6 +291,47 @@ pub fn identify_slides(
     Ok(Found::new(identified, prior, slides, scenario)?)
 }
 
+/// Slides once, and returns the slide with the reason to refuse it.
+fn attempt<R: SlideRig>(
+    rig: &mut R,
+    program: &Scenario,
+    index: usize,
+    posture: Posture,
+    prior: &Prior,
+    limits: &Limits,
+) -> Result<(Slide, Option<Refusal>), R::Error> {
+    let slid = rig.slide(program, posture)?;
+    let surprise = slid.surprise(program);
+    let whole = if slid.is_complete {
+        slid.ticks.len()
+    } else {
+        program.run.ticks() as usize
+    };
+    let slide = slide_of(program, posture, slid.ticks, whole);
+    let of_friction = || {
+        let belt_m_s = program.belt.profile.speed_m_s(0.0);
+        check_friction(index, &slide, belt_m_s, limits).err()
+    };
+    let share = slide.share_on_belt(limits);
+    let refusal = match surprise {
+        Some(surprise) => {
+            // A tip that was thrown at once shows no friction.
+            let slid_s = slide.on_belt(limits).count() as f64 / f64::from(program.run.tick_hz);
+            let has_slid = slid_s >= MEAN_S;
+            misread(index, &slide, prior, limits)
+                .or_else(|| of_friction().filter(|_| has_slid))
+                .or(Some(surprise.refusal(index)))
+        }
+        None if share < ON_BELT => Some(Refusal::NotOnBelt {
+            slide: index,
+            percent: 100.0 * share,
+            contact_n: limits.contact_n,
+        }),
+        None => of_friction(),
+    };
+    Ok((slide, refusal))
+}
+
 /// Slides in both postures, and identifies the arm. The scenario's posture comes first, so that the operator turns the
 /// elbow once for each round.
 ///
@@ -296,50 +345,31 @@ pub fn identify_arm<R: SlideRig>(
     let prior = prior(scenario, drawn);
     let limits = limits(scenario);
     let first = posture(scenario)?;
-    let tick_hz = f64::from(scenario.run.tick_hz);
     let mut slides = Vec::new();
     let mut slide = |known: &Scenario, share: f64, postures: [Posture; 2]| {
         for posture in postures {
             let index = slides.len();
-            let mut attempt = |force_n| {
+            let attempt = |rig: &mut R, force_n| {
                 let program = slide_scenario(known, share, posture, force_n)?;
-                let slid = rig.slide(&program, posture);
-                let slid = slid.map_err(IdentificationError::Rig)?;
-                let surprise = slid.surprise(&program);
-                let whole = if slid.is_complete {
-                    slid.ticks.len()
-                } else {
-                    program.run.ticks() as usize
-                };
-                let slide = slide_of(scenario, posture, slid.ticks, whole);
-                let belt_m_s = program.belt.profile.speed_m_s(0.0);
-                if let Some(surprise) = surprise {
-                    // A tip that was thrown at once shows no friction.
-                    let slid_s = slide.on_belt(&limits).count() as f64 / tick_hz;
-                    let has_slid = slid_s >= MEAN_S;
-                    let of_friction = || {
-                        let checked = check_friction(index, &slide, belt_m_s, &limits);
-                        checked.err().filter(|_| has_slid)
-                    };
-                    let refusal = misread(index, &slide, &prior, &limits)
-                        .or_else(of_friction)
-                        .unwrap_or(surprise.refusal(index));
-                    return Err(refusal.into());
-                }
-                Ok::<_, IdentificationError<R::Error>>((slide, belt_m_s))
+                attempt(rig, &program, index, posture, &prior, &limits)
+                    .map_err(IdentificationError::Rig)
             };
             let [first_n, others_n @ ..] = ATTEMPTS_N;
-            let (mut slide, mut belt_m_s) = attempt(first_n)?;
+            let (mut slide, mut refusal) = attempt(rig, first_n)?;
             for force_n in others_n {
-                if slide.share_on_belt(&limits) < ON_BELT {
-                    (slide, belt_m_s) = attempt(force_n)?;
+                match &refusal {
+                    Some(lost @ (Refusal::MovedTooFast { .. } | Refusal::NotOnBelt { .. })) => {
+                        rig.repeats(lost, force_n);
+                        (slide, refusal) = attempt(rig, force_n)?;
+                    }
+                    _ => break,
                 }
             }
-            // What is left of a lost tip is refused for another reason.
-            if slide.share_on_belt(&limits) >= ON_BELT {
-                check_friction(index, &slide, belt_m_s, &limits)?;
+            match refusal {
+                // What is left of a lost tip may be refused for a better reason.
+                None | Some(Refusal::NotOnBelt { .. }) => slides.push(slide),
+                Some(refusal) => return Err(refusal.into()),
             }
-            slides.push(slide);
         }
         Ok::<_, IdentificationError<R::Error>>(slides.clone())
     };

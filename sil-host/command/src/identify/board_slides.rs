@@ -5,7 +5,8 @@ use std::time::{Duration, Instant};
 
 use painleve_board::arm::{ArmEvent, ConnectedArm};
 use painleve_commission::elbow_side;
-use painleve_commission::identification::{Slid, SlideRig};
+use painleve_commission::identification::{SLIDES, Slid, SlideRig};
+use painleve_identify::Refusal;
 use painleve_plant::scenario::Scenario;
 use painleve_process::interrupt::Interrupt;
 use painleve_process::terminal::warn;
@@ -27,6 +28,8 @@ pub struct BoardSlides {
     port: PathBuf,
     operator: Operator,
     interrupt: Interrupt,
+    /// Number of the slide.
+    number: usize,
 }
 
 impl BoardSlides {
@@ -39,6 +42,7 @@ impl BoardSlides {
             port: port.to_owned(),
             operator: Operator::listen()?,
             interrupt: Interrupt::catch()?,
+            number: 0,
         })
     }
 
@@ -91,13 +95,15 @@ impl SlideRig for BoardSlides {
     type Error = BoardRigError;
 
     fn slide(&mut self, scenario: &Scenario, posture: Posture) -> Result<Slid, BoardRigError> {
+        self.number += 1;
+        let number = self.number;
         let configuration = scenario.controller_configuration();
         let mut arm = ConnectedArm::open(&self.port, &configuration, FrameSource::Sensors)?;
         // What was typed before confirms no task.
         self.operator.attend()?;
         let speed_m_s = scenario.belt.profile.speed_m_s(0.0);
         warn(format_args!(
-            "operator: let the belt run towards {}t, at about {:.2} m/s; hold the arm with its tip on the belt right below \
+            "slide {number} of {SLIDES}; operator: let the belt run towards {}t, at about {:.2} m/s; hold the arm with its tip on the belt right below \
              joint 1, the elbow {}; then press Return",
             if speed_m_s < 0.0 { '−' } else { '+' },
             speed_m_s.abs(),
@@ -123,5 +129,12 @@ impl SlideRig for BoardSlides {
         let slid = slid?;
         stopped?;
         Ok(slid)
+    }
+
+    fn repeats(&mut self, reason: &Refusal, force_n: f64) {
+        self.number -= 1;
+        warn(format_args!(
+            "{reason}. Once more, pressed with {force_n} N"
+        ));
     }
 }

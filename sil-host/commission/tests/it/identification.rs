@@ -235,10 +235,10 @@ fn a_tip_rests_on_its_belt_before_it_slides() {
     assert!(rig.largest_force_n < 7.0, "{}", rig.largest_force_n);
 }
 
-/// A rig of which some attempts end soon, as after a fault, with the tip on the belt until then.
+/// A rig that ends some of its attempts.
 struct Breaking {
     rig: SimulatedSlides,
-    breaks: fn(u32) -> bool,
+    break_off: fn(u32, &mut Slid),
     attempts: u32,
 }
 
@@ -248,36 +248,74 @@ impl SlideRig for Breaking {
     fn slide(&mut self, scenario: &Scenario, posture: Posture) -> Result<Slid, SimulatedError> {
         let mut slid = self.rig.slide(scenario, posture)?;
         self.attempts += 1;
-        if (self.breaks)(self.attempts) {
-            slid.ticks.truncate(1200);
-            slid.is_complete = false;
-        }
+        (self.break_off)(self.attempts, &mut slid);
         Ok(slid)
     }
 }
 
+/// Returns why the arm of such a rig is refused, and the number of its attempts.
+fn broken_off(break_off: fn(u32, &mut Slid)) -> (Option<Refusal>, u32) {
+    let scenario = Scenario::default();
+    let actual = imperfect(&scenario, 51_000).unwrap();
+    let mut rig = Breaking {
+        rig: SimulatedSlides::new(actual, None),
+        break_off,
+        attempts: 0,
+    };
+    let refusal = match identify_arm(&mut rig, &scenario, &drawn()) {
+        Ok(_) => None,
+        Err(IdentificationError::Refused(refusal)) => Some(refusal),
+        Err(other) => panic!("{other}"),
+    };
+    (refusal, rig.attempts)
+}
+
+/// As after a fault, with the tip on the belt until then.
+fn end_early(slid: &mut Slid) {
+    slid.ticks.truncate(1200);
+    slid.is_complete = false;
+}
+
 #[test]
 fn a_slide_that_ends_early_is_repeated_and_refused_if_none_is_whole() {
-    let scenario = Scenario::default();
-    let identify = |breaks: fn(u32) -> bool| {
-        let actual = imperfect(&scenario, 51_000).unwrap();
-        let mut rig = Breaking {
-            rig: SimulatedSlides::new(actual, None),
-            breaks,
-            attempts: 0,
-        };
-        let found = identify_arm(&mut rig, &scenario, &drawn());
-        (found.map(|_| ()), rig.attempts)
-    };
-    let (found, attempts) = identify(|attempt| attempt == 1);
-    assert!(found.is_ok(), "{found:?}");
-    assert_eq!(attempts, 5);
-    let (refused, attempts) = identify(|_| true);
-    let Err(IdentificationError::Refused(Refusal::NotOnBelt { percent, .. })) = refused else {
-        panic!("{refused:?}");
+    let (refusal, attempts) = broken_off(|attempt, slid| {
+        if attempt == 1 {
+            end_early(slid);
+        }
+    });
+    assert_eq!((refusal, attempts), (None, 5));
+    let (refusal, attempts) = broken_off(|_, slid| end_early(slid));
+    let Some(Refusal::NotOnBelt { percent, .. }) = refusal else {
+        panic!("{refusal:?}");
     };
     assert!(percent < 20.0, "{percent}");
     assert_eq!(attempts, 6);
+}
+
+/// The tip leaves its belt while the elbow turns at 3 rad/s.
+fn throw(slid: &mut Slid) {
+    end_early(slid);
+    let thrown = turning(3.0, ForceCounts(0), 0..40);
+    let lasts = slid.ticks.iter_mut().rev().take(40).rev();
+    for (tick, thrown) in lasts.zip(thrown.ticks) {
+        let [_, EncoderCounts(elbow)] = &mut tick.sensor.joints;
+        *elbow = elbow.wrapping_add(thrown.sensor.joints[1].0) & 0x3fff;
+        tick.sensor.normal_force = thrown.sensor.normal_force;
+    }
+}
+
+#[test]
+fn a_tip_that_is_thrown_presses_more_at_the_next_attempt() {
+    let (refusal, attempts) = broken_off(|attempt, slid| {
+        if attempt <= 2 {
+            throw(slid);
+        }
+    });
+    assert_eq!((refusal, attempts), (None, 6));
+    let (refusal, attempts) = broken_off(|_, slid| throw(slid));
+    let is_fast = matches!(refusal, Some(Refusal::MovedTooFast { slide: 0, .. }));
+    assert!(is_fast, "{refusal:?}");
+    assert_eq!(attempts, 3);
 }
 
 /// Changes an arm, and returns why it is refused.
