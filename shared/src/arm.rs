@@ -100,26 +100,26 @@ pub struct Arm<T: Real> {
     /// H, m.
     pub(crate) height_m: T,
     /// M11 and M22, kg·m².
-    pub(crate) inertia_1: T,
-    pub(crate) inertia_2: T,
+    pub(crate) inertia_1_kg_m2: T,
+    pub(crate) inertia_2_kg_m2: T,
     /// A in M12 = A cos δ − J2, kg·m², with δ = θ2 − θ1 and J2 the second rotor's inertia.
-    pub(crate) inertia_coupling: T,
+    pub(crate) inertia_coupling_kg_m2: T,
     /// A/4 for links of unit length, kg.
-    pub(crate) quarter_coupled_mass: T,
-    pub(crate) rotor_1: T,
-    pub(crate) rotor_2: T,
+    pub(crate) quarter_coupled_mass_kg: T,
+    pub(crate) rotor_1_kg_m2: T,
+    pub(crate) rotor_2_kg_m2: T,
     /// Torques of gravity across and along the belt on each link, N·m.
-    pub(crate) gravity_1_normal: T,
-    pub(crate) gravity_1_tangential: T,
-    pub(crate) gravity_2_normal: T,
-    pub(crate) gravity_2_tangential: T,
-    pub(crate) damping_2: T,
+    pub(crate) gravity_1_normal_nm: T,
+    pub(crate) gravity_1_tangential_nm: T,
+    pub(crate) gravity_2_normal_nm: T,
+    pub(crate) gravity_2_tangential_nm: T,
+    pub(crate) damping_2_nms_rad: T,
     /// Damping of joint 1 in excess of joint 2, N·m·s/rad.
-    pub(crate) damping_1_excess: T,
-    pub(crate) stiffness_1: T,
-    pub(crate) stiffness_2: T,
-    pub(crate) spring_rest_1: T,
-    pub(crate) spring_rest_2: T,
+    pub(crate) damping_1_excess_nms_rad: T,
+    pub(crate) stiffness_1_nm_rad: T,
+    pub(crate) stiffness_2_nm_rad: T,
+    pub(crate) spring_rest_1_rad: T,
+    pub(crate) spring_rest_2_rad: T,
 }
 
 impl<T: Real> Arm<T> {
@@ -147,7 +147,7 @@ impl<T: Real> Arm<T> {
             range::check("link_inertia_kg_m2 / (m l²)", ratio, 0.0, 1.0)
                 .map_err(|error| error.inside("arm"))?;
         }
-        let [rotor_1, rotor_2] = parameters.rotor_inertia_kg_m2;
+        let [rotor_1_kg_m2, rotor_2_kg_m2] = parameters.rotor_inertia_kg_m2;
         let tip = parameters.tip_mass_kg;
         // Mass at the end of link 1, and the moments of mass about both joints.
         let carried = (mass_2 + tip) * length_1;
@@ -158,38 +158,41 @@ impl<T: Real> Arm<T> {
             moment_2 * gravity,
         );
         let (sine, cosine) = parameters.belt_tilt_rad.sine_cosine();
-        let [damping_1, damping_2] = parameters.damping_nms_rad;
-        let [stiffness_1, stiffness_2] = parameters.stiffness_nm_rad;
-        let [spring_rest_1, spring_rest_2] = parameters.spring_rest_rad;
+        let [damping_1_nms_rad, damping_2_nms_rad] = parameters.damping_nms_rad;
+        let [stiffness_1_nm_rad, stiffness_2_nm_rad] = parameters.stiffness_nm_rad;
+        let [spring_rest_1_rad, spring_rest_2_rad] = parameters.spring_rest_rad;
         let arm = Self {
             length_1_m: length_1,
             length_2_m: length_2,
             length_ratio: length_2 / length_1,
             height_m: parameters.height_m,
-            inertia_1: own_1
+            inertia_1_kg_m2: own_1
                 + mass_1 * centre_1 * centre_1
                 + carried * length_1
-                + rotor_1
-                + rotor_2,
-            inertia_2: own_2 + mass_2 * centre_2 * centre_2 + tip * length_2 * length_2 + rotor_2,
-            inertia_coupling: moment_2 * length_1,
-            quarter_coupled_mass: moment_2 / length_2 * T::literal(0.25),
-            rotor_1,
-            rotor_2,
-            gravity_1_normal: gravity_1 * cosine,
-            gravity_1_tangential: gravity_1 * sine,
-            gravity_2_normal: gravity_2 * cosine,
-            gravity_2_tangential: gravity_2 * sine,
-            damping_2,
-            damping_1_excess: damping_1 - damping_2,
-            stiffness_1,
-            stiffness_2,
-            spring_rest_1,
-            spring_rest_2,
+                + rotor_1_kg_m2
+                + rotor_2_kg_m2,
+            inertia_2_kg_m2: own_2
+                + mass_2 * centre_2 * centre_2
+                + tip * length_2 * length_2
+                + rotor_2_kg_m2,
+            inertia_coupling_kg_m2: moment_2 * length_1,
+            quarter_coupled_mass_kg: moment_2 / length_2 * T::literal(0.25),
+            rotor_1_kg_m2,
+            rotor_2_kg_m2,
+            gravity_1_normal_nm: gravity_1 * cosine,
+            gravity_1_tangential_nm: gravity_1 * sine,
+            gravity_2_normal_nm: gravity_2 * cosine,
+            gravity_2_tangential_nm: gravity_2 * sine,
+            damping_2_nms_rad,
+            damping_1_excess_nms_rad: damping_1_nms_rad - damping_2_nms_rad,
+            stiffness_1_nm_rad,
+            stiffness_2_nm_rad,
+            spring_rest_1_rad,
+            spring_rest_2_rad,
         };
         // M12 = A cos δ − J2 has its largest magnitude where both terms add.
-        let product = arm.inertia_1 * arm.inertia_2;
-        let coupling = arm.inertia_coupling.abs() + rotor_2;
+        let product = arm.inertia_1_kg_m2 * arm.inertia_2_kg_m2;
+        let coupling = arm.inertia_coupling_kg_m2.abs() + rotor_2_kg_m2;
         let determinant = (product - coupling * coupling) / product;
         range::check(
             "link_inertia_kg_m2, link_centre_of_mass_m or rotor_inertia_kg_m2: det M / (M11 M22)",
@@ -218,16 +221,17 @@ impl<T: Real> Arm<T> {
     pub fn scale_from(&mut self, nominal: &Self, length_1_m: T) {
         let ratio = length_1_m / nominal.length_1_m;
         let square = ratio * ratio;
-        let rotors = nominal.rotor_1 + nominal.rotor_2;
+        let rotors = nominal.rotor_1_kg_m2 + nominal.rotor_2_kg_m2;
         self.length_1_m = length_1_m;
         self.length_2_m = length_1_m * nominal.length_ratio;
-        self.inertia_1 = (nominal.inertia_1 - rotors) * square + rotors;
-        self.inertia_2 = (nominal.inertia_2 - nominal.rotor_2) * square + nominal.rotor_2;
-        self.inertia_coupling = nominal.inertia_coupling * square;
-        self.gravity_1_normal = nominal.gravity_1_normal * ratio;
-        self.gravity_1_tangential = nominal.gravity_1_tangential * ratio;
-        self.gravity_2_normal = nominal.gravity_2_normal * ratio;
-        self.gravity_2_tangential = nominal.gravity_2_tangential * ratio;
+        self.inertia_1_kg_m2 = (nominal.inertia_1_kg_m2 - rotors) * square + rotors;
+        self.inertia_2_kg_m2 =
+            (nominal.inertia_2_kg_m2 - nominal.rotor_2_kg_m2) * square + nominal.rotor_2_kg_m2;
+        self.inertia_coupling_kg_m2 = nominal.inertia_coupling_kg_m2 * square;
+        self.gravity_1_normal_nm = nominal.gravity_1_normal_nm * ratio;
+        self.gravity_1_tangential_nm = nominal.gravity_1_tangential_nm * ratio;
+        self.gravity_2_normal_nm = nominal.gravity_2_normal_nm * ratio;
+        self.gravity_2_tangential_nm = nominal.gravity_2_tangential_nm * ratio;
     }
 
     /// Largest distance of the tip from the first joint, m: l1 + l2.
@@ -289,11 +293,11 @@ mod tests {
         let arm = Arm::<f64>::new(ArmParameters::default()).unwrap();
         let (m, l, g) = (0.12, 0.21, 9.81);
         for (ours, paper) in [
-            (arm.inertia_1, 4.0 / 3.0 * m * l * l),
-            (arm.inertia_coupling, 0.5 * m * l * l),
-            (arm.inertia_2, m * l * l / 3.0),
-            (arm.gravity_1_normal, 1.5 * m * g * l),
-            (arm.gravity_2_normal, 0.5 * m * g * l),
+            (arm.inertia_1_kg_m2, 4.0 / 3.0 * m * l * l),
+            (arm.inertia_coupling_kg_m2, 0.5 * m * l * l),
+            (arm.inertia_2_kg_m2, m * l * l / 3.0),
+            (arm.gravity_1_normal_nm, 1.5 * m * g * l),
+            (arm.gravity_2_normal_nm, 0.5 * m * g * l),
         ] {
             assert!((ours / paper - 1.0).abs() < 1e-15, "{ours} {paper}");
         }
@@ -397,10 +401,10 @@ mod tests {
             Arm::<f64>::new(rods).unwrap(),
             Arm::<f64>::new(explicit).unwrap(),
         );
-        assert!((one.inertia_1 - other.inertia_1).abs() < 1e-15);
-        assert!((one.inertia_2 - other.inertia_2).abs() < 1e-15);
-        assert_eq!(one.inertia_coupling, other.inertia_coupling);
-        assert_eq!(one.gravity_1_normal, other.gravity_1_normal);
+        assert!((one.inertia_1_kg_m2 - other.inertia_1_kg_m2).abs() < 1e-15);
+        assert!((one.inertia_2_kg_m2 - other.inertia_2_kg_m2).abs() < 1e-15);
+        assert_eq!(one.inertia_coupling_kg_m2, other.inertia_coupling_kg_m2);
+        assert_eq!(one.gravity_1_normal_nm, other.gravity_1_normal_nm);
     }
 
     #[test]

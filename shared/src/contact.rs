@@ -28,8 +28,8 @@ pub enum Slip {
 impl Slip {
     /// Returns the direction of a slip velocity; zero counts as positive.
     #[inline]
-    pub fn of<T: Real>(slip_velocity: T) -> Self {
-        if slip_velocity < T::zero() {
+    pub fn of<T: Real>(slip_velocity_m_s: T) -> Self {
+        if slip_velocity_m_s < T::zero() {
             Slip::Negative
         } else {
             Slip::Positive
@@ -62,13 +62,13 @@ pub enum SolutionMode {
 }
 
 impl SolutionMode {
-    /// Returns the mode for given p (1/kg) and b (m/s²).
+    /// Returns the mode for these values of p and b.
     ///
     /// The paper's section III requires "b > 0" while sliding. Its own equation for f_n requires b
     /// < 0, in agreement with its section II.
     #[inline]
-    pub fn classify<T: Real>(p: T, b: T) -> Self {
-        match (p > T::zero(), b < T::zero()) {
+    pub fn classify<T: Real>(p_per_kg: T, b_m_s2: T) -> Self {
+        match (p_per_kg > T::zero(), b_m_s2 < T::zero()) {
             (true, true) => SolutionMode::Sliding,
             (true, false) => SolutionMode::Flight,
             (false, false) => SolutionMode::Indeterminate,
@@ -89,20 +89,20 @@ pub struct ContactTerms<T: Real> {
 impl<T: Real> ContactTerms<T> {
     /// Free normal acceleration b, m/s².
     #[inline]
-    pub fn b(&self) -> T {
+    pub fn b_m_s2(&self) -> T {
         self.free_acceleration_m_s2.y
     }
 
     /// p = Q22 − μ s Q21, 1/kg, with s the slip direction.
     #[inline]
-    pub fn p(&self, friction: T, slip: Slip) -> T {
+    pub fn p_per_kg(&self, friction: T, slip: Slip) -> T {
         p_of(&self.q, friction, slip)
     }
 
     /// Normal force of sliding, f_n = −b/p, N; meaningful in [`SolutionMode::Sliding`].
     #[inline]
     pub fn sliding_normal_force_n(&self, friction: T, slip: Slip) -> T {
-        -self.b() / self.p(friction, slip)
+        -self.b_m_s2() / self.p_per_kg(friction, slip)
     }
 
     /// Returns the contact force (f_t, f_n), N, that gives the tip the acceleration
@@ -145,15 +145,15 @@ pub struct ScaledRow<T> {
 impl<T: Real> Arm<T> {
     /// Q = J M⁻¹ Jᵀ, 1/kg.
     #[inline]
-    pub fn inverse_tip_inertia(&self, pose: &Pose<T>) -> Matrix2<T> {
+    pub fn inverse_tip_inertia_per_kg(&self, pose: &Pose<T>) -> Matrix2<T> {
         let jacobian = self.jacobian(pose);
         jacobian * self.inverse_mass_matrix(pose) * jacobian.transpose()
     }
 
     /// Returns p, 1/kg, of a posture for friction μ and slip direction.
     #[inline]
-    pub fn p(&self, pose: &Pose<T>, friction: T, slip: Slip) -> T {
-        p_of(&self.inverse_tip_inertia(pose), friction, slip)
+    pub fn p_per_kg(&self, pose: &Pose<T>, friction: T, slip: Slip) -> T {
+        p_of(&self.inverse_tip_inertia_per_kg(pose), friction, slip)
     }
 
     /// Returns Q12 and Q22 with the tip on the belt at `tip_t_m`. `None` out of reach or for a straight arm.
@@ -196,13 +196,13 @@ impl<T: Real> Arm<T> {
             height * along_2 - tip_t_m * width,
             tip_t_m * along_2 + height * width,
         );
-        let coupling = self.quarter_coupled_mass * (beyond - within) - self.rotor_2;
+        let coupling = self.quarter_coupled_mass_kg * (beyond - within) - self.rotor_2_kg_m2;
         // M⁻¹ j2, scaled by det M.
         let (row_1, row_2) = (
-            self.inertia_2 * y_1 - coupling * y_2,
-            self.inertia_1 * y_2 - coupling * y_1,
+            self.inertia_2_kg_m2 * y_1 - coupling * y_2,
+            self.inertia_1_kg_m2 * y_2 - coupling * y_1,
         );
-        let determinant = self.inertia_1 * self.inertia_2 - coupling * coupling;
+        let determinant = self.inertia_1_kg_m2 * self.inertia_2_kg_m2 - coupling * coupling;
         let scale = T::literal(4.0) * square * square * determinant;
         Some(ScaledRow {
             q12: x_1 * row_1 + x_2 * row_2,
@@ -211,25 +211,25 @@ impl<T: Real> Arm<T> {
         })
     }
 
-    /// Evaluates all contact terms at link angles `theta` (rad), rates `theta_dot` (rad/s) and
+    /// Evaluates all contact terms at link angles `theta_rad`, rates `theta_dot_rad_s` and
     /// generalised torque `torque_nm`.
     #[inline]
     pub fn contact_terms(
         &self,
-        theta: &LinkMotion<T>,
-        theta_dot: &LinkMotion<T>,
+        theta_rad: &LinkMotion<T>,
+        theta_dot_rad_s: &LinkMotion<T>,
         pose: &Pose<T>,
         torque_nm: &GeneralisedTorque<T>,
     ) -> ContactTerms<T> {
         let jacobian = self.jacobian(pose);
         let mobility = self.inverse_mass_matrix(pose);
         let load = *torque_nm
-            - self.passive_torque_nm(theta, theta_dot, pose)
-            - self.centrifugal_torque_nm(theta_dot, pose);
+            - self.passive_torque_nm(theta_rad, theta_dot_rad_s, pose)
+            - self.centrifugal_torque_nm(theta_dot_rad_s, pose);
         ContactTerms {
             q: jacobian * mobility * jacobian.transpose(),
             free_acceleration_m_s2: jacobian * (mobility * load.vector())
-                + self.centripetal_m_s2(pose, theta_dot),
+                + self.centripetal_m_s2(pose, theta_dot_rad_s),
         }
     }
 }
@@ -245,8 +245,8 @@ mod tests {
     }
 
     fn p_on_belt(tip_t_m: f64, posture: Posture, friction: f64, slip: Slip) -> f64 {
-        let theta = arm().link_angles_on_belt_rad(tip_t_m, posture).unwrap();
-        arm().p(&Pose::new(&theta), friction, slip)
+        let theta_rad = arm().link_angles_on_belt_rad(tip_t_m, posture).unwrap();
+        arm().p_per_kg(&Pose::new(&theta_rad), friction, slip)
     }
 
     /// Table II of the paper at μ = 0.6 gives 0.183 elbow up. For elbow down it prints 0.168, which
@@ -291,8 +291,8 @@ mod tests {
         #[test]
         fn the_row_on_the_belt_is_that_of_the_matrix_q(tip in -0.184_f64..0.184, up: bool) {
             let posture = if up { Posture::ElbowUp } else { Posture::ElbowDown };
-            let theta = arm().link_angles_on_belt_rad(tip, posture).unwrap();
-            let q = arm().inverse_tip_inertia(&Pose::new(&theta));
+            let theta_rad = arm().link_angles_on_belt_rad(tip, posture).unwrap();
+            let q = arm().inverse_tip_inertia_per_kg(&Pose::new(&theta_rad));
             let row = arm().inverse_inertia_row_on_belt(tip, posture).unwrap();
             prop_assert!((row.q22 / row.factor - q.m22).abs() < 1e-9 * q.m22);
             prop_assert!(row.q22 > 0.0);
@@ -304,9 +304,9 @@ mod tests {
             tip in -0.17_f64..0.17, w1 in -3.0_f64..3.0, w2 in -3.0_f64..3.0,
             a_t in -20.0_f64..20.0, a_n in -20.0_f64..20.0,
         ) {
-            let theta = arm().link_angles_on_belt_rad(tip, Posture::ElbowDown).unwrap();
+            let theta_rad = arm().link_angles_on_belt_rad(tip, Posture::ElbowDown).unwrap();
             let terms = arm().contact_terms(
-                &theta, &LinkMotion::new(w1, w2), &Pose::new(&theta), &GeneralisedTorque::zeros());
+                &theta_rad, &LinkMotion::new(w1, w2), &Pose::new(&theta_rad), &GeneralisedTorque::zeros());
             let wanted = Vector2::new(a_t, a_n);
             let force = terms.force_for_acceleration_n(&wanted).unwrap();
             prop_assert!((terms.free_acceleration_m_s2 + terms.q * force - wanted).norm() < 1e-9);

@@ -25,8 +25,8 @@ pub enum Posture {
 
 impl Posture {
     /// Returns the posture of link angles (rad); the straight arm counts as elbow down.
-    pub fn of<T: Real>(theta: &LinkMotion<T>) -> Self {
-        if theta.second() > theta.first() {
+    pub fn of<T: Real>(theta_rad: &LinkMotion<T>) -> Self {
+        if theta_rad.second() > theta_rad.first() {
             Posture::ElbowUp
         } else {
             Posture::ElbowDown
@@ -54,9 +54,9 @@ pub struct Pose<T: Real> {
 impl<T: Real> Pose<T> {
     /// Evaluates the pose of link angles in rad.
     #[inline]
-    pub fn new(theta: &LinkMotion<T>) -> Self {
+    pub fn new(theta_rad: &LinkMotion<T>) -> Self {
         let [(sine_1, cosine_1), (sine_2, cosine_2)] =
-            T::sines_cosines(theta.first(), theta.second());
+            T::sines_cosines(theta_rad.first(), theta_rad.second());
         Self {
             sine: Vector2::new(sine_1, sine_2),
             cosine: Vector2::new(cosine_1, cosine_2),
@@ -118,10 +118,10 @@ impl<T: Real> Arm<T> {
 
     /// Centripetal acceleration s = J̇ θ̇ of the tip, m/s², for link rates θ̇ (rad/s).
     #[inline]
-    pub fn centripetal_m_s2(&self, pose: &Pose<T>, theta_dot: &LinkMotion<T>) -> Vector2<T> {
+    pub fn centripetal_m_s2(&self, pose: &Pose<T>, theta_dot_rad_s: &LinkMotion<T>) -> Vector2<T> {
         let length = self.length_1_m;
-        let square_1 = theta_dot.first() * theta_dot.first();
-        let square_2 = self.length_ratio * (theta_dot.second() * theta_dot.second());
+        let square_1 = theta_dot_rad_s.first() * theta_dot_rad_s.first();
+        let square_2 = self.length_ratio * (theta_dot_rad_s.second() * theta_dot_rad_s.second());
         Vector2::new(
             -length * (square_1 * pose.sine.x + square_2 * pose.sine.y),
             length * (square_1 * pose.cosine.x + square_2 * pose.cosine.y),
@@ -220,8 +220,8 @@ mod tests {
         let up = LinkMotion::new(down.second(), down.first());
         assert_eq!(Posture::of(&down), Posture::ElbowDown);
         assert_eq!(Posture::of(&up), Posture::ElbowUp);
-        for theta in [down, up] {
-            let tip = arm().tip_m(&Pose::new(&theta));
+        for theta_rad in [down, up] {
+            let tip = arm().tip_m(&Pose::new(&theta_rad));
             assert!((tip.x + 0.1624).abs() < 2e-4, "{tip}");
             assert!((tip.y + 0.3775).abs() < 2e-4, "{tip}");
         }
@@ -248,9 +248,9 @@ mod tests {
         ) {
             let posture = if up { Posture::ElbowUp } else { Posture::ElbowDown };
             let tip = Vector2::new(distance * direction.sin(), -distance * direction.cos());
-            let theta = arm().link_angles_rad(&tip, posture).unwrap();
-            prop_assert!((arm().tip_m(&Pose::new(&theta)) - tip).norm() < 1e-12);
-            prop_assert_eq!(Posture::of(&theta), posture);
+            let theta_rad = arm().link_angles_rad(&tip, posture).unwrap();
+            prop_assert!((arm().tip_m(&Pose::new(&theta_rad)) - tip).norm() < 1e-12);
+            prop_assert_eq!(Posture::of(&theta_rad), posture);
         }
 
         #[test]
@@ -258,9 +258,9 @@ mod tests {
             tip in -0.18_f64..0.18, speed in -1.0_f64..1.0, up: bool,
         ) {
             let posture = if up { Posture::ElbowUp } else { Posture::ElbowDown };
-            let theta = arm().link_angles_on_belt_rad(tip, posture).unwrap();
+            let theta_rad = arm().link_angles_on_belt_rad(tip, posture).unwrap();
             let rates = arm().link_rates_on_belt_rad_s(tip, speed, posture);
-            let velocity = arm().jacobian(&Pose::new(&theta)) * rates.vector();
+            let velocity = arm().jacobian(&Pose::new(&theta_rad)) * rates.vector();
             prop_assert!((velocity - Vector2::new(speed, 0.0)).norm() < 1e-9);
         }
 
@@ -268,11 +268,11 @@ mod tests {
         fn jacobian_and_centripetal_term_are_derivatives_of_the_tip(
             t1 in -3.0_f64..3.0, t2 in -3.0_f64..3.0, w1 in -5.0_f64..5.0, w2 in -5.0_f64..5.0,
         ) {
-            let (theta, rate, step) = (LinkMotion::new(t1, t2), LinkMotion::new(w1, w2), 1e-4);
-            let tip = |s: f64| arm().tip_m(&Pose::new(&(theta + rate * s)));
+            let (theta_rad, rate, step) = (LinkMotion::new(t1, t2), LinkMotion::new(w1, w2), 1e-4);
+            let tip = |s: f64| arm().tip_m(&Pose::new(&(theta_rad + rate * s)));
             let velocity = (tip(step) - tip(-step)) / (2.0 * step);
             let acceleration = (tip(step) - tip(0.0) * 2.0 + tip(-step)) / (step * step);
-            let pose = Pose::new(&theta);
+            let pose = Pose::new(&theta_rad);
             prop_assert!((arm().jacobian(&pose) * rate.vector() - velocity).norm() < 1e-6);
             prop_assert!((arm().centripetal_m_s2(&pose, &rate) - acceleration).norm() < 1e-5);
         }

@@ -313,7 +313,7 @@ mod tests {
             let torque = JointTorque::new(u1, u2);
             let b = |torque: &JointTorque<f32>| {
                 let pose = Pose::new(&model.theta_rad);
-                arm.contact_terms(&model.theta_rad, &model.theta_dot_rad_s, &pose, &torque.to_links()).b()
+                arm.contact_terms(&model.theta_rad, &model.theta_dot_rad_s, &pose, &torque.to_links()).b_m_s2()
             };
             let change = b(&torque) - b(&JointTorque::zeros());
             let expected = model.free_slope_per_kg_m.dot(torque.vector());

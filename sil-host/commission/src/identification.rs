@@ -555,7 +555,8 @@ fn ripple_m_s2(
             mean_n += share * (normal_n - mean_n);
             let [first, elbow] =
                 [0, 1].map(|joint| joint_rad(geometry, joint, reading.encoders_rad[joint]));
-            let q = arm.inverse_tip_inertia(&Pose::new(&LinkMotion::new(first, first + elbow)));
+            let q =
+                arm.inverse_tip_inertia_per_kg(&Pose::new(&LinkMotion::new(first, first + elbow)));
             let p = q.m22 + q.m12 * tangential_n / normal_n;
             let off_m_s2 = p * (normal_n - mean_n);
             sum += off_m_s2 * off_m_s2;

@@ -62,7 +62,7 @@ impl SetDown {
             let theta_rad = arm.link_angles_on_belt_rad(there_m, posture);
             theta_rad.map_or(f32::MIN, |theta_rad| {
                 let pose = Pose::new(&theta_rad);
-                let [one, other] = slips.map(|slip| arm.p(&pose, coefficient, slip));
+                let [one, other] = slips.map(|slip| arm.p_per_kg(&pose, coefficient, slip));
                 one.min(other)
             })
         };

@@ -52,7 +52,7 @@ impl ParadoxDistance {
     /// Measures at link angles (rad), with p in 1/kg.
     pub fn measure(&mut self, theta: &LinkMotion<f64>, p_per_kg: f64) -> Distance {
         let pose = Pose::new(theta);
-        let q = self.arm.inverse_tip_inertia(&pose);
+        let q = self.arm.inverse_tip_inertia_per_kg(&pose);
         let p_ratio = p_per_kg / q.m22;
         if !p_ratio.is_finite() {
             return Distance::UNKNOWN;
@@ -122,7 +122,9 @@ mod tests {
             .arm
             .link_angles_on_belt_rad(tip_m, Posture::ElbowDown)
             .unwrap();
-        let p = distance.arm.p(&Pose::new(&theta), friction, Slip::Positive);
+        let p = distance
+            .arm
+            .p_per_kg(&Pose::new(&theta), friction, Slip::Positive);
         distance.measure(&theta, p)
     }
 

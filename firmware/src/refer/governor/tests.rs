@@ -138,7 +138,7 @@ fn the_stretch_ends_where_p_has_its_least_value_in_kilograms() {
     let theta = arm
         .link_angles_on_belt_rad(0.164_71 - back_m, Posture::ElbowDown)
         .unwrap();
-    let p = arm.p(&Pose::new(&theta), 0.6, Slip::Positive);
+    let p = arm.p_per_kg(&Pose::new(&theta), 0.6, Slip::Positive);
     assert!((p - 2.0).abs() < 0.02, "{p} 1/kg, {back_m} m back");
 }
 

@@ -255,7 +255,9 @@ pub fn state_after(
     kind: ImpactKind,
 ) -> Result<AfterImpact, EndlessImpact> {
     let velocity = motion.relative_velocity_m_s(time_s, state);
-    let q = motion.arm.inverse_tip_inertia(&Pose::new(&theta(state)));
+    let q = motion
+        .arm
+        .inverse_tip_inertia_per_kg(&Pose::new(&theta(state)));
     let impact = match kind {
         ImpactKind::Collision => collide(&q, motion.friction, law, velocity),
         ImpactKind::WithoutCollision => throw(&q, motion.friction, law, velocity.x),

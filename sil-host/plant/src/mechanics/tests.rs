@@ -69,8 +69,8 @@ fn x0_a_is_thrown_off_immediately() {
     let mut statistics = Statistics::new(0.05);
     let mut plant = plant(&PlantParameters::default(), x0_a());
     let terms = plant.motion().terms(0.0, plant.state());
-    assert!((terms.p(0.6, painleve_shared::Slip::Positive) + 1.62).abs() < 0.01);
-    assert!((terms.b() + 2.09).abs() < 0.01);
+    assert!((terms.p_per_kg(0.6, painleve_shared::Slip::Positive) + 1.62).abs() < 0.01);
+    assert!((terms.b_m_s2() + 2.09).abs() < 0.01);
     plant.settle(&mut statistics).unwrap();
     assert_eq!(statistics.impacts_without_collision, 1);
     assert_eq!(statistics.first_lift_off_s, Some(0.0));
@@ -362,7 +362,7 @@ fn an_indeterminate_slide_ends_before_p_changes_its_sign() {
         torque: TorqueSegment::constant(JointTorque::new(1.0, 0.0)),
     };
     let terms = motion(0.0).terms(0.0, &state);
-    assert!(terms.b() > 0.0, "{}", terms.b());
+    assert!(terms.b_m_s2() > 0.0, "{}", terms.b_m_s2());
     let with_p = |share: f64| motion((1.0 - share) * terms.q.m22 / terms.q.m12);
     let slide = ContactMode::SlidePositive;
     for (share, mode) in [

@@ -64,8 +64,8 @@ pub fn decide(
         return Continuation::Mode(from_rest(motion, t_s, &terms));
     }
     let slip = Slip::of(slip_speed);
-    let guarded = |side| guarded_p(side, terms.p(motion.friction, slip), terms.q.m22);
-    Continuation::Mode(match SolutionMode::classify(guarded(1.0), terms.b()) {
+    let guarded = |side| guarded_p(side, terms.p_per_kg(motion.friction, slip), terms.q.m22);
+    Continuation::Mode(match SolutionMode::classify(guarded(1.0), terms.b_m_s2()) {
         SolutionMode::Sliding => ContactMode::slide(slip),
         SolutionMode::Flight => ContactMode::Flight,
         SolutionMode::Indeterminate => match indeterminate {
@@ -84,7 +84,7 @@ fn guarded_p(side: f64, p_per_kg: f64, q22_per_kg: f64) -> f64 {
 }
 
 fn from_rest(motion: &Motion<'_>, t_s: f64, terms: &ContactTerms<f64>) -> ContactMode {
-    if terms.b() >= 0.0 {
+    if terms.b_m_s2() >= 0.0 {
         return ContactMode::Flight;
     }
     if cone_margin(motion, t_s, terms) >= 0.0 {
@@ -95,7 +95,7 @@ fn from_rest(motion: &Motion<'_>, t_s: f64, terms: &ContactTerms<f64>) -> Contac
     let away = |slip: Slip| slip.sign::<f64>() * slip_acceleration(motion, t_s, terms, slip);
     [Slip::Positive, Slip::Negative]
         .into_iter()
-        .filter(|slip| guarded_p(1.0, terms.p(motion.friction, *slip), terms.q.m22) > 0.0)
+        .filter(|slip| guarded_p(1.0, terms.p_per_kg(motion.friction, *slip), terms.q.m22) > 0.0)
         .max_by(|one, other| away(*one).total_cmp(&away(*other)))
         // In one direction p is at least Q22, so there is a slip.
         .map_or(ContactMode::Flight, ContactMode::slide)
@@ -131,7 +131,11 @@ pub fn event_functions(
         return [motion.gap_m(state), f64::INFINITY, f64::INFINITY];
     }
     let terms = motion.terms(t_s, state);
-    [cone_margin(motion, t_s, &terms), -terms.b(), f64::INFINITY]
+    [
+        cone_margin(motion, t_s, &terms),
+        -terms.b_m_s2(),
+        f64::INFINITY,
+    ]
 }
 
 /// Returns the [`event_functions`] of a slide on either [side](guarded_p) of p = 0.
@@ -145,8 +149,8 @@ fn slide_functions(
     let terms = motion.terms(t_s, state);
     [
         slip.sign::<f64>() * motion.relative_velocity_m_s(t_s, state).x,
-        side * -terms.b(),
-        guarded_p(side, terms.p(motion.friction, slip), terms.q.m22),
+        side * -terms.b_m_s2(),
+        guarded_p(side, terms.p_per_kg(motion.friction, slip), terms.q.m22),
     ]
 }
 

@@ -45,9 +45,9 @@ fn every_reference_state_agrees() {
         close("q11", terms.q.m11, 0.0);
         close("q12", terms.q.m12, 1e-1);
         close("q22", terms.q.m22, 0.0);
-        close("b", terms.b(), 1e-1);
-        close("p_plus", terms.p(friction, Slip::Positive), 1e-1);
-        close("p_minus", terms.p(friction, Slip::Negative), 1e-1);
+        close("b", terms.b_m_s2(), 1e-1);
+        close("p_plus", terms.p_per_kg(friction, Slip::Positive), 1e-1);
+        close("p_minus", terms.p_per_kg(friction, Slip::Negative), 1e-1);
 
         let jacobian = arm.jacobian(&pose);
         let velocity = jacobian * theta_dot.vector();

@@ -13,7 +13,7 @@ fn sample(tick: u32) -> Sample {
     let time_s = f64::from(tick) * 1e-3;
     let theta_rad = LinkMotion::new(-0.2, -0.6);
     let arm = Arm::new(Scenario::default().arm).unwrap();
-    let p_per_kg = arm.p(&Pose::new(&theta_rad), 0.6, Slip::Positive);
+    let p_per_kg = arm.p_per_kg(&Pose::new(&theta_rad), 0.6, Slip::Positive);
     Sample {
         plant: Snapshot {
             time_s,

@@ -61,14 +61,15 @@ impl<'a> BeltLine<'a> {
     }
 
     /// Returns Q at τ, 1/kg.
-    pub fn inverse_tip_inertia(&self, tau: f64) -> Matrix2<f64> {
+    pub fn inverse_tip_inertia_per_kg(&self, tau: f64) -> Matrix2<f64> {
         self.arm
-            .inverse_tip_inertia(&Pose::new(&self.theta_rad(tau)))
+            .inverse_tip_inertia_per_kg(&Pose::new(&self.theta_rad(tau)))
     }
 
     /// Returns p at τ, 1/kg.
-    pub fn p(&self, tau: f64, friction: f64, slip: Slip) -> f64 {
-        self.arm.p(&Pose::new(&self.theta_rad(tau)), friction, slip)
+    pub fn p_per_kg(&self, tau: f64, friction: f64, slip: Slip) -> f64 {
+        self.arm
+            .p_per_kg(&Pose::new(&self.theta_rad(tau)), friction, slip)
     }
 
     /// Returns p/Q22 at τ.
@@ -78,7 +79,7 @@ impl<'a> BeltLine<'a> {
 
     /// Returns the friction coefficient at which p is zero at τ; infinite if there is none.
     pub fn friction_of_zero_p(&self, tau: f64, slip: Slip) -> f64 {
-        let q = self.inverse_tip_inertia(tau);
+        let q = self.inverse_tip_inertia_per_kg(tau);
         let pull = slip.sign::<f64>() * q.m21;
         if pull > 0.0 {
             q.m22 / pull
@@ -91,7 +92,7 @@ impl<'a> BeltLine<'a> {
 /// Returns p/Q22 of an arm at these link angles (rad), with the tip anywhere.
 pub fn p_ratio(arm: &Arm<f64>, theta_rad: &LinkMotion<f64>, friction: f64, slip: Slip) -> f64 {
     let pose = Pose::new(theta_rad);
-    arm.p(&pose, friction, slip) / arm.inverse_tip_inertia(&pose).m22
+    arm.p_per_kg(&pose, friction, slip) / arm.inverse_tip_inertia_per_kg(&pose).m22
 }
 
 /// Returns the intervals of τ on which `value` is positive, in order, to rounding.
@@ -226,7 +227,8 @@ pub fn admissible_m(
 ) -> Vec<Range<f64>> {
     let line = BeltLine::new(arm, posture);
     let reach_m = USED_REACH * arm.reach_on_belt_m();
-    let p = |tau| line.p(tau, friction, slip) - least_p_ratio * line.p(tau, 0.0, slip);
+    let p =
+        |tau| line.p_per_kg(tau, friction, slip) - least_p_ratio * line.p_per_kg(tau, 0.0, slip);
     let mut stretches: Vec<_> = positive_stretches(p)
         .into_iter()
         .map(|(from, to)| line.tip_t_m(from).max(-reach_m)..line.tip_t_m(to).min(reach_m))

@@ -22,7 +22,10 @@ impl Figure for Admissible {
                 let line = BeltLine::new(&arm, posture);
                 let points = (0..=CURVE_POINTS).map(|index| {
                     let tau = core::f64::consts::PI * (index as f64 / CURVE_POINTS as f64 - 0.5);
-                    (line.tip_t_m(tau), line.p(tau, self.mu, Slip::Positive))
+                    (
+                        line.tip_t_m(tau),
+                        line.p_per_kg(tau, self.mu, Slip::Positive),
+                    )
                 });
                 marks.push(Mark::line(name, colour, points.collect()));
             }

@@ -117,7 +117,7 @@ fn intervals(
 ) -> Intervals {
     let line = BeltLine::new(arm, posture);
     let at = |mu: f64| -> Vec<[f64; 2]> {
-        positive_stretches(|tau| line.p(tau, mu, Slip::Positive))
+        positive_stretches(|tau| line.p_per_kg(tau, mu, Slip::Positive))
             .into_iter()
             .map(|(from, to)| [line.tip_t_m(from), line.tip_t_m(to)])
             .collect()
@@ -190,7 +190,7 @@ mod tests {
                 let line = BeltLine::new(&arm, posture);
                 for end in intervals.intervals_m.iter().flatten() {
                     if end.abs() < ours.reach_m {
-                        let p = line.p(line.tau(*end).unwrap(), mu, Slip::Positive);
+                        let p = line.p_per_kg(line.tau(*end).unwrap(), mu, Slip::Positive);
                         assert!(p.abs() < 1e-11, "p({end}) = {p}");
                     }
                 }

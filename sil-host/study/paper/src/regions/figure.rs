@@ -106,12 +106,16 @@ impl Map {
             .collect();
         let p: Vec<f64> = fine
             .iter()
-            .map(|column| column.as_ref().map_or(f64::NAN, |c| c.p(mu, self.slip)))
+            .map(|column| {
+                column
+                    .as_ref()
+                    .map_or(f64::NAN, |c| c.p_per_kg(mu, self.slip))
+            })
             .collect();
         let mut cells = Vec::with_capacity(FINE_COLUMNS * FINE_ROWS);
         for rate in middles(&rate_range, FINE_ROWS) {
             cells.extend(fine.iter().zip(&p).map(|(column, &p)| match column {
-                Some(column) => place(SolutionMode::classify(p, column.b(rate))),
+                Some(column) => place(SolutionMode::classify(p, column.b_m_s2(rate))),
                 None => u8::MAX,
             }));
         }

@@ -34,21 +34,21 @@ impl<'a> RegionColumn<'a> {
     }
 
     /// Returns b at a rate θ̇1.
-    pub(super) fn b(&self, rate: f64) -> f64 {
+    pub(super) fn b_m_s2(&self, rate: f64) -> f64 {
         let rates = LinkMotion::new(rate, self.ratio * rate);
         let pose = Pose::new(&self.theta);
         self.arm
             .contact_terms(&self.theta, &rates, &pose, &GeneralisedTorque::zeros())
-            .b()
+            .b_m_s2()
     }
 
-    pub(super) fn p(&self, mu: f64, slip: Slip) -> f64 {
-        self.arm.p(&Pose::new(&self.theta), mu, slip)
+    pub(super) fn p_per_kg(&self, mu: f64, slip: Slip) -> f64 {
+        self.arm.p_per_kg(&Pose::new(&self.theta), mu, slip)
     }
 
     /// Returns the two rates θ̇1 at which b = 0, in ascending order.
     fn rates_of_zero_b(&self) -> Option<[f64; 2]> {
-        let (minus, zero, plus) = (self.b(-1.0), self.b(0.0), self.b(1.0));
+        let (minus, zero, plus) = (self.b_m_s2(-1.0), self.b_m_s2(0.0), self.b_m_s2(1.0));
         let (square, linear) = (0.5 * (plus + minus) - zero, 0.5 * (plus - minus));
         let discriminant = linear * linear - 4.0 * square * zero;
         if discriminant < 0.0 || square == 0.0 {
@@ -66,7 +66,7 @@ pub(super) fn zeros_of_p(arm: &Arm<f64>, mu: f64, theta2: Theta2, slip: Slip) ->
     let mut zeros = Vec::new();
     for posture in [Posture::ElbowUp, Posture::ElbowDown] {
         let line = BeltLine::new(arm, posture);
-        let stretches = positive_stretches(|tau| line.p(tau, mu, slip));
+        let stretches = positive_stretches(|tau| line.p_per_kg(tau, mu, slip));
         // The ends of the whole line are not zeros.
         let inside = |tau: &f64| tau.abs() < core::f64::consts::FRAC_PI_2;
         let ends = stretches.into_iter().flat_map(|(from, to)| [from, to]);

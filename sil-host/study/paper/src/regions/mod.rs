@@ -186,7 +186,7 @@ fn map(
             let Some(column) = RegionColumn::new(arm, degrees.to_radians(), theta2) else {
                 continue;
             };
-            let (b, p) = (column.b(rate), column.p(mu, slip));
+            let (b, p) = (column.b_m_s2(rate), column.p_per_kg(mu, slip));
             cells.push(RegionCell {
                 mu,
                 theta2,

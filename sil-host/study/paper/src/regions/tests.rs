@@ -76,11 +76,11 @@ fn b_is_zero_on_its_line_and_changes_sign_across() {
     for map in &regions.maps {
         for &[theta1, rate] in map.b_zero.iter().flatten() {
             let column = RegionColumn::new(&arm, theta1.to_radians(), map.theta2).unwrap();
-            let scale = column.b(2.0 * rate + 1.0).abs() + column.b(0.0).abs();
+            let scale = column.b_m_s2(2.0 * rate + 1.0).abs() + column.b_m_s2(0.0).abs();
             assert!(
-                column.b(rate).abs() < 1e-9 * scale,
+                column.b_m_s2(rate).abs() < 1e-9 * scale,
                 "{theta1} {rate}: {}",
-                column.b(rate)
+                column.b_m_s2(rate)
             );
             points += 1;
         }

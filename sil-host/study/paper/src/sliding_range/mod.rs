@@ -272,7 +272,7 @@ impl Case<'_> {
         let line = BeltLine::new(&arm, self.posture);
         // The tip starts at rest.
         let slip = Slip::of(-self.scenario.belt.profile.speed_m_s(0.0));
-        let stretches = positive_stretches(|tau| line.p(tau, self.mu, slip));
+        let stretches = positive_stretches(|tau| line.p_per_kg(tau, self.mu, slip));
         let around = stretches
             .into_iter()
             .map(|(from, to)| (line.tip_t_m(from), line.tip_t_m(to)))

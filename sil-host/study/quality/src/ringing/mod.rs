@@ -140,7 +140,7 @@ impl Ringing {
     fn way(&self, arm: &Arm<f64>, base: &Scenario) -> Result<Way, StudyError> {
         let line = BeltLine::new(arm, POSTURE);
         let slip = slip(base);
-        let p = |tau| line.p(tau, base.belt.friction, slip);
+        let p = |tau| line.p_per_kg(tau, base.belt.friction, slip);
         let last = positive_stretches(p).pop();
         let (low, to) = last.ok_or(StudyError::NothingAdmissible)?;
         let ratio = |tau| line.p_ratio(tau, base.belt.friction, slip);
@@ -198,7 +198,7 @@ impl Study for Ringing {
         let ratio = |tau| line.p_ratio(tau, base.belt.friction, slip(&base));
         let rings = |tau| self.rings(damping_ns_m, rate_per_s, line.tip_t_m(tau));
         let contact = |tau| {
-            let q22 = line.inverse_tip_inertia(tau).m22;
+            let q22 = line.inverse_tip_inertia_per_kg(tau).m22;
             ContactAtPlace {
                 stiffness_n_m: self.stiffness_n_m,
                 damping_ns_m,

@@ -126,7 +126,7 @@ impl Stiffness {
     /// [`OutOfRange`] naming the first parameter of the arm that is out of range.
     pub fn sticking_mass_kg(&self) -> Result<f64, OutOfRange> {
         let arm = Arm::new(self.parameters.arm)?;
-        let q = arm.inverse_tip_inertia(&Pose::new(&theta(&at_rest(INCONSISTENT_DEG))));
+        let q = arm.inverse_tip_inertia_per_kg(&Pose::new(&theta(&at_rest(INCONSISTENT_DEG))));
         Ok(q.m11 / q.determinant())
     }
 

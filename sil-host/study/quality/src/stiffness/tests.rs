@@ -55,7 +55,7 @@ fn the_end_of_the_belt_goes_to_where_p_is_zero() {
         let line = painleve_study_core::belt_line::BeltLine::new(&arm, posture);
         let p = |tip_t_m: f64| {
             let tau = line.tau(tip_t_m).unwrap();
-            line.p(
+            line.p_per_kg(
                 tau,
                 study.parameters.friction,
                 painleve_shared::Slip::Positive,
