@@ -21,7 +21,8 @@ settings! {
         distance_m: f32 = 0.5e-3, 0.0..=0.1, "m";
         /// Deceleration at which the reference stops before an edge.
         braking_m_s2: f32 = 1.0, 1e-3..=1e3, "m/s²";
-        /// Largest speed of the approach to a reference that is away from the tip.
-        catch_up_m_s: f32 = 0.3, 1e-3..=10.0, "m/s";
+        /// Largest speed of the approach to a reference that is away from the tip, in addition to its own. A tip that overtakes
+        /// a slow belt slips in the other direction, for which nothing has been kept free.
+        catch_up_m_s: f32 = 0.06, 1e-3..=10.0, "m/s";
     }
 }

@@ -292,7 +292,10 @@ fn a_moving_reference_is_caught_without_a_step_at_any_rate() {
     for tick_hz in [1e3, 1e2] {
         let configuration = Configuration {
             tick_hz,
-            ..configuration(&GovernorSettings::default())
+            ..configuration(&GovernorSettings {
+                catch_up_m_s: 0.3,
+                ..GovernorSettings::default()
+            })
         };
         let tick_s = configuration.tick_s();
         let mut governor = with(&configuration);

@@ -59,3 +59,30 @@ fn estimates_of_an_unstable_arm_stay_numbers() {
     assert_ne!(end.fault, None);
     assert_ne!(end.fault, Some(Fault::NotFinite));
 }
+
+/// A reference passes a belt of 0.1 m/s, and ends beyond an edge: where the tip is slower again, the nearest stretch for its slip
+/// lies farther along the belt. On a fast way there, it passed the belt once more and was thrown off.
+#[test]
+fn a_tip_is_not_led_past_a_slow_belt() {
+    for ramp_s in ["1", "1.5"] {
+        for deviation_m in ["0.001", "0.003"] {
+            let reference = format!(
+                "controller.reference=[{{ ramp = {{ target_m = -0.178, duration_s = {ramp_s} }} }}]"
+            );
+            let deviation = format!("controller.estimator.tip_deviation_m={deviation_m}");
+            let end = run(
+                "hybrid-elbow-up",
+                &[
+                    "initial={ tip_m = 0.0, elbow = 'up' }",
+                    "belt.profile={ kind = 'constant', speed_m_s = -0.1 }",
+                    "contact.kind=compliant",
+                    "run.duration_s=7",
+                    &reference,
+                    &deviation,
+                ],
+            );
+            assert_eq!((end.statistics.lift_offs, end.fault), (0, None));
+            assert!((end.final_tip_t_m + 0.178).abs() < 1e-3);
+        }
+    }
+}
