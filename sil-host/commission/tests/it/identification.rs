@@ -238,8 +238,11 @@ fn a_tip_rests_on_its_belt_before_it_slides() {
 /// A rig that ends some of its attempts.
 struct Breaking {
     rig: SimulatedSlides,
-    break_off: fn(u32, &mut Slid),
-    attempts: u32,
+    break_off: fn(usize, &mut Slid),
+    /// Normal force of each attempt, N.
+    forces_n: Vec<f32>,
+    /// Forces of the attempts that were announced as repeated.
+    repeated_n: Vec<f32>,
 }
 
 impl SlideRig for Breaking {
@@ -247,27 +250,36 @@ impl SlideRig for Breaking {
 
     fn slide(&mut self, scenario: &Scenario, posture: Posture) -> Result<Slid, SimulatedError> {
         let mut slid = self.rig.slide(scenario, posture)?;
-        self.attempts += 1;
-        (self.break_off)(self.attempts, &mut slid);
+        if let Some(LawSettings::Hybrid(law)) = scenario.controller.law.of_set() {
+            self.forces_n.push(law.normal_force_n);
+        }
+        (self.break_off)(self.forces_n.len(), &mut slid);
         Ok(slid)
+    }
+
+    fn repeats(&mut self, _: &Refusal, force_n: f64) {
+        self.repeated_n.push(force_n as f32);
     }
 }
 
-/// Returns why the arm of such a rig is refused, and the number of its attempts.
-fn broken_off(break_off: fn(u32, &mut Slid)) -> (Option<Refusal>, u32) {
+/// Returns why the arm of such a rig is refused, and the normal force of each attempt, N.
+fn broken_off(break_off: fn(usize, &mut Slid)) -> (Option<Refusal>, Vec<f32>) {
     let scenario = Scenario::default();
     let actual = imperfect(&scenario, 51_000).unwrap();
     let mut rig = Breaking {
         rig: SimulatedSlides::new(actual, None),
         break_off,
-        attempts: 0,
+        forces_n: Vec::new(),
+        repeated_n: Vec::new(),
     };
     let refusal = match identify_arm(&mut rig, &scenario, &drawn()) {
         Ok(_) => None,
         Err(IdentificationError::Refused(refusal)) => Some(refusal),
         Err(other) => panic!("{other}"),
     };
-    (refusal, rig.attempts)
+    let harder = rig.forces_n.iter().filter(|force_n| **force_n > 4.0);
+    assert!(harder.eq(&rig.repeated_n), "{:?}", rig.repeated_n);
+    (refusal, rig.forces_n)
 }
 
 /// As after a fault, with the tip on the belt until then.
@@ -278,18 +290,19 @@ fn end_early(slid: &mut Slid) {
 
 #[test]
 fn a_slide_that_ends_early_is_repeated_and_refused_if_none_is_whole() {
-    let (refusal, attempts) = broken_off(|attempt, slid| {
+    let (refusal, forces_n) = broken_off(|attempt, slid| {
         if attempt == 1 {
             end_early(slid);
         }
     });
-    assert_eq!((refusal, attempts), (None, 5));
-    let (refusal, attempts) = broken_off(|_, slid| end_early(slid));
+    assert_eq!(refusal, None);
+    assert_eq!(forces_n, [4.0, 5.0, 4.0, 4.0, 4.0]);
+    let (refusal, forces_n) = broken_off(|_, slid| end_early(slid));
     let Some(Refusal::NotOnBelt { percent, .. }) = refusal else {
         panic!("{refusal:?}");
     };
     assert!(percent < 20.0, "{percent}");
-    assert_eq!(attempts, 6);
+    assert_eq!(forces_n, [4.0, 5.0, 6.0, 4.0, 5.0, 6.0]);
 }
 
 /// The tip leaves its belt while the elbow turns at 3 rad/s.
@@ -306,16 +319,17 @@ fn throw(slid: &mut Slid) {
 
 #[test]
 fn a_tip_that_is_thrown_presses_more_at_the_next_attempt() {
-    let (refusal, attempts) = broken_off(|attempt, slid| {
+    let (refusal, forces_n) = broken_off(|attempt, slid| {
         if attempt <= 2 {
             throw(slid);
         }
     });
-    assert_eq!((refusal, attempts), (None, 6));
-    let (refusal, attempts) = broken_off(|_, slid| throw(slid));
+    assert_eq!(refusal, None);
+    assert_eq!(forces_n, [4.0, 5.0, 6.0, 4.0, 4.0, 4.0]);
+    let (refusal, forces_n) = broken_off(|_, slid| throw(slid));
     let is_fast = matches!(refusal, Some(Refusal::MovedTooFast { slide: 0, .. }));
     assert!(is_fast, "{refusal:?}");
-    assert_eq!(attempts, 3);
+    assert_eq!(forces_n, [4.0, 5.0, 6.0]);
 }
 
 /// Changes an arm, and returns why it is refused.
