@@ -88,7 +88,7 @@ fn an_arm_that_has_changed_since_it_was_identified_is_told() {
             "--json",
         ];
         let report = bench.report(&[&line[..], length].concat());
-        let page = std::fs::read_to_string(bench.path("out/rehearsed/identified.html")).unwrap();
+        let page = std::fs::read_to_string(bench.path("out/rehearsed-again.html")).unwrap();
         let changes: Vec<String> = serde_json::from_value(report["changes"].clone()).unwrap();
         assert_eq!(page.matches("Warning: ").count(), changes.len());
         changes
