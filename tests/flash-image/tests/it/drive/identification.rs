@@ -46,7 +46,10 @@ fn at_start(task: &str) -> Scenario {
 fn an_arm_on_a_board_is_identified() {
     let rig = EmulatedRig::new();
     rig.act(|bench| bench.encoder_offset = [0, ZERO_COUNTS]);
-    let arguments = ["identify", DEFAULT, "--json", "--output", "identified.toml"];
+    // As after commissioning.
+    let commissioned = "knowledge.source='drawn, zeros by plumb line'";
+    let output = ["--json", "--output", "identified.toml"];
+    let arguments = [&["identify", DEFAULT, "--set", commissioned][..], &output].concat();
     let mut program = StartedProgram::start(Bench::new("identify"), &rig.port, &arguments);
     let stderr = program.child.stderr.take().unwrap();
     let mut text = String::new();
