@@ -16,7 +16,6 @@ use painleve_firmware::estimate::encoder_correction::EncoderCorrection;
 use painleve_firmware::law::LawSettings;
 use painleve_identify::geometry::joint_rad;
 use painleve_identify::parameters::Drawn;
-use painleve_identify::passes::ON_BELT;
 use painleve_identify::torques::{Estimate, Joints};
 use painleve_identify::verdict::{check_friction, misread};
 use painleve_identify::{
@@ -85,13 +84,18 @@ pub trait SlideRig {
     /// Failure of the rig.
     type Error: std::error::Error;
 
-    /// Has the tip set down in a posture and the belt run as the scenario says, runs the controller with its settings and
-    /// reference, and returns the ticks from the start of the reference to its end, or until the tip was lost or
-    /// there is a [surprise](Slid::surprise).
+    /// Makes the slide with this index, of [`SLIDES`]: has the tip set down in a posture and the belt run as the scenario
+    /// says, runs the controller with its settings and reference, and returns the ticks from the start of the reference to
+    /// its end, or until the tip was lost or there is a [surprise](Slid::surprise).
     ///
     /// # Errors
     /// If the operator gives up, or the rig or its drive fails.
-    fn slide(&mut self, scenario: &Scenario, posture: Posture) -> Result<Slid, Self::Error>;
+    fn slide(
+        &mut self,
+        index: usize,
+        scenario: &Scenario,
+        posture: Posture,
+    ) -> Result<Slid, Self::Error>;
 
     /// Tells the operator why the last slide is repeated, with the tip pressed by `force_n` (N).
     fn repeats(&mut self, reason: &Refusal, force_n: f64) {
@@ -300,7 +304,7 @@ fn attempt<R: SlideRig>(
     prior: &Prior,
     limits: &Limits,
 ) -> Result<(Slide, Option<Refusal>), R::Error> {
-    let slid = rig.slide(program, posture)?;
+    let slid = rig.slide(index, program, posture)?;
     let surprise = slid.surprise(program);
     let whole = if slid.is_complete {
         slid.ticks.len()
@@ -312,22 +316,16 @@ fn attempt<R: SlideRig>(
         let belt_m_s = program.belt.profile.speed_m_s(0.0);
         check_friction(index, &slide, belt_m_s, limits).err()
     };
-    let share = slide.share_on_belt(limits);
-    let refusal = match surprise {
-        Some(surprise) => {
-            // A tip that was thrown at once shows no friction.
-            let slid_s = slide.on_belt(limits).count() as f64 / f64::from(program.run.tick_hz);
-            let has_slid = slid_s >= MEAN_S;
-            misread(index, &slide, prior, limits)
-                .or_else(|| of_friction().filter(|_| has_slid))
-                .or(Some(surprise.refusal(index)))
-        }
-        None if share < ON_BELT => Some(Refusal::NotOnBelt {
-            slide: index,
-            percent: 100.0 * share,
-            contact_n: limits.contact_n,
-        }),
-        None => of_friction(),
+    let refusal = if let Some(surprise) = surprise {
+        // A tip that was thrown at once shows no friction.
+        let slid_s = slide.on_belt(limits).count() as f64 / f64::from(program.run.tick_hz);
+        let has_slid = slid_s >= MEAN_S;
+        misread(index, &slide, prior, limits)
+            .or_else(|| of_friction().filter(|_| has_slid))
+            .or(Some(surprise.refusal(index)))
+    } else {
+        let of_belt = slide.check_on_belt(index, limits).err();
+        of_belt.or_else(of_friction)
     };
     Ok((slide, refusal))
 }

@@ -34,6 +34,9 @@ pub use parameters::{Parameter, Parameters, Prior};
 use passes::Points;
 pub use refusal::{Missing, Refusal};
 
+/// Least share of a slide's readings with the tip on the belt.
+const ON_BELT: f64 = 0.8;
+
 /// Readings of one tick of a slide.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Reading {
@@ -71,6 +74,22 @@ impl Slide {
     pub fn share_on_belt(&self, limits: &Limits) -> f64 {
         let whole = self.whole.saturating_sub(self.missing);
         self.on_belt(limits).count() as f64 / whole.max(self.readings.len()).max(1) as f64
+    }
+
+    /// Checks that the tip was on the belt in most readings of the slide with this index.
+    ///
+    /// # Errors
+    /// [`Refusal::NotOnBelt`] if it was not.
+    pub fn check_on_belt(&self, index: usize, limits: &Limits) -> Result<(), Refusal> {
+        let share = self.share_on_belt(limits);
+        if share < ON_BELT {
+            return Err(Refusal::NotOnBelt {
+                slide: index,
+                percent: 100.0 * share,
+                contact_n: limits.contact_n,
+            });
+        }
+        Ok(())
     }
 }
 

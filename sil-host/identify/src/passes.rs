@@ -19,9 +19,6 @@ const STRETCH_M: f64 = 1e-3;
 /// Unevenness of belt and tip that is always assumed, m.
 const UNEVEN_M: f64 = 20e-6;
 
-/// Least share of readings with the tip on the belt.
-pub const ON_BELT: f64 = 0.8;
-
 /// Largest share of ticks without all readings.
 const MOST_MISSING: f64 = 0.2;
 
@@ -162,14 +159,7 @@ impl Points {
                 percent: 100.0 * missing,
             });
         }
-        let share = of.share_on_belt(limits);
-        if share < ON_BELT {
-            return Err(Refusal::NotOnBelt {
-                slide,
-                percent: 100.0 * share,
-                contact_n: limits.contact_n,
-            });
-        }
+        of.check_on_belt(slide, limits)?;
         let touching: Vec<_> = of.on_belt(limits).collect();
         let tip_t_m = |encoders_rad| Place::at(parameters, encoders_rad).tip_t_m;
         let mut rest = touching.as_slice();

@@ -28,8 +28,6 @@ pub struct BoardSlides {
     port: PathBuf,
     operator: Operator,
     interrupt: Interrupt,
-    /// Number of the slide.
-    number: usize,
 }
 
 impl BoardSlides {
@@ -42,7 +40,6 @@ impl BoardSlides {
             port: port.to_owned(),
             operator: Operator::listen()?,
             interrupt: Interrupt::catch()?,
-            number: 0,
         })
     }
 
@@ -94,17 +91,21 @@ impl BoardSlides {
 impl SlideRig for BoardSlides {
     type Error = BoardRigError;
 
-    fn slide(&mut self, scenario: &Scenario, posture: Posture) -> Result<Slid, BoardRigError> {
-        self.number += 1;
-        let number = self.number;
+    fn slide(
+        &mut self,
+        index: usize,
+        scenario: &Scenario,
+        posture: Posture,
+    ) -> Result<Slid, BoardRigError> {
         let configuration = scenario.controller_configuration();
         let mut arm = ConnectedArm::open(&self.port, &configuration, FrameSource::Sensors)?;
         // What was typed before confirms no task.
         self.operator.attend()?;
         let speed_m_s = scenario.belt.profile.speed_m_s(0.0);
         warn(format_args!(
-            "slide {number} of {SLIDES}; operator: let the belt run towards {}t, at about {:.2} m/s; hold the arm with its tip on the belt right below \
-             joint 1, the elbow {}; then press Return",
+            "slide {} of {SLIDES}; operator: let the belt run towards {}t, at about {:.2} m/s; hold the arm with its tip on the \
+             belt right below joint 1, the elbow {}; then press Return",
+            index + 1,
             if speed_m_s < 0.0 { '−' } else { '+' },
             speed_m_s.abs(),
             elbow_side(posture)
@@ -132,7 +133,6 @@ impl SlideRig for BoardSlides {
     }
 
     fn repeats(&mut self, reason: &Refusal, force_n: f64) {
-        self.number -= 1;
         warn(format_args!(
             "{reason}. Once more, pressed with {force_n} N"
         ));

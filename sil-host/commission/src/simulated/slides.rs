@@ -165,7 +165,12 @@ impl<P: Plant> SimulatedSlides<P> {
 impl<P: Plant> SlideRig for SimulatedSlides<P> {
     type Error = SimulatedError;
 
-    fn slide(&mut self, scenario: &Scenario, posture: Posture) -> Result<Slid, SimulatedError> {
+    fn slide(
+        &mut self,
+        _: usize,
+        scenario: &Scenario,
+        posture: Posture,
+    ) -> Result<Slid, SimulatedError> {
         self.slides += 1;
         let posture = match self.mistake {
             Some(GeometryMistake::SamePosture) => Posture::ElbowDown,

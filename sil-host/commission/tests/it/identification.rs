@@ -228,9 +228,12 @@ fn a_tip_rests_on_its_belt_before_it_slides() {
     let scenario = study.scenario(study.cells()[0], LOOPS * 59).unwrap();
     let actual = imperfect(&scenario, 7_016_059).unwrap();
     let mut rig = SimulatedSlides::new(actual, None);
-    for posture in [Posture::ElbowDown, Posture::ElbowUp] {
+    for (index, posture) in [Posture::ElbowDown, Posture::ElbowUp]
+        .into_iter()
+        .enumerate()
+    {
         let slide = slide_scenario(&scenario, 0.2, posture, 4.0).unwrap();
-        assert!(rig.slide(&slide, posture).unwrap().is_complete);
+        assert!(rig.slide(index, &slide, posture).unwrap().is_complete);
     }
     assert!(rig.largest_force_n < 7.0, "{}", rig.largest_force_n);
 }
@@ -248,8 +251,13 @@ struct Breaking {
 impl SlideRig for Breaking {
     type Error = SimulatedError;
 
-    fn slide(&mut self, scenario: &Scenario, posture: Posture) -> Result<Slid, SimulatedError> {
-        let mut slid = self.rig.slide(scenario, posture)?;
+    fn slide(
+        &mut self,
+        index: usize,
+        scenario: &Scenario,
+        posture: Posture,
+    ) -> Result<Slid, SimulatedError> {
+        let mut slid = self.rig.slide(index, scenario, posture)?;
         if let Some(LawSettings::Hybrid(law)) = scenario.controller.law.of_set() {
             self.forces_n.push(law.normal_force_n);
         }
@@ -259,6 +267,15 @@ impl SlideRig for Breaking {
 
     fn repeats(&mut self, _: &Refusal, force_n: f64) {
         self.repeated_n.push(force_n as f32);
+    }
+}
+
+/// Returns why the arm of a rig is refused; `None` if it is identified.
+fn refusal_by<R: SlideRig>(rig: &mut R, scenario: &Scenario) -> Option<Refusal> {
+    match identify_arm(rig, scenario, &drawn()) {
+        Ok(_) => None,
+        Err(IdentificationError::Refused(refusal)) => Some(refusal),
+        Err(other) => panic!("{other}"),
     }
 }
 
@@ -272,11 +289,7 @@ fn broken_off(break_off: fn(usize, &mut Slid)) -> (Option<Refusal>, Vec<f32>) {
         forces_n: Vec::new(),
         repeated_n: Vec::new(),
     };
-    let refusal = match identify_arm(&mut rig, &scenario, &drawn()) {
-        Ok(_) => None,
-        Err(IdentificationError::Refused(refusal)) => Some(refusal),
-        Err(other) => panic!("{other}"),
-    };
+    let refusal = refusal_by(&mut rig, &scenario);
     let harder = rig.forces_n.iter().filter(|force_n| **force_n > 4.0);
     assert!(harder.eq(&rig.repeated_n), "{:?}", rig.repeated_n);
     (refusal, rig.forces_n)
@@ -338,10 +351,7 @@ fn refusal_of(change: impl Fn(&mut Scenario)) -> Refusal {
     let mut actual = imperfect(&scenario, 51_000).unwrap();
     change(&mut actual);
     let mut rig = SimulatedSlides::new(actual, None);
-    match identify_arm(&mut rig, &scenario, &drawn()).map(|_| ()) {
-        Err(IdentificationError::Refused(refusal)) => refusal,
-        other => panic!("{other:?}"),
-    }
+    refusal_by(&mut rig, &scenario).unwrap()
 }
 
 /// The elbow's spring is six times as stiff as the drawing says; then somebody pushes the tip along the belt.
