@@ -129,12 +129,12 @@ impl References {
             },
             requested_m: wanted.position_m,
             posture: self.posture,
-            stretch: self.governor.stretch(),
+            stretch: self.governor.stretch,
             edges_for_landing: recovering
                 && self
                     .governor
                     .has_edges_for(self.posture, self.asked_p_ratio()),
-            at_edge: drives && !recovering && self.governor.is_at_edge(),
+            at_edge: drives && !recovering && self.governor.at_edge,
             recovering,
         }
     }

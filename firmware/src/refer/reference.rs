@@ -137,7 +137,7 @@ impl TipReference {
 }
 
 /// Follows a program tick by tick; initially at the start of its program, at z_t = 0.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct ReferenceGenerator {
     program: Program,
     tick_hz: f32,
@@ -157,10 +157,7 @@ impl ReferenceGenerator {
         Self {
             program: program.clone(),
             tick_hz,
-            segment: 0,
-            start_m: 0.0,
-            elapsed_ticks: 0,
-            next: TipReference::default(),
+            ..Self::default()
         }
     }
 

@@ -77,7 +77,7 @@ impl SetDown {
         let found = (0..MOST_CALLS).find_map(|_| {
             governor.search(&arm, posture, best_m, &friction, 0.0);
             let is_found = governor.has_edges_for(posture, 0.0);
-            is_found.then(|| governor.stretch())
+            is_found.then_some(governor.stretch)
         });
         let clipped = |it: Stretch| {
             f64::from(it.lower_m.max(-farthest_m))..f64::from(it.upper_m.min(farthest_m))

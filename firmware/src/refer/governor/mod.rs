@@ -12,8 +12,6 @@
 mod search;
 mod settings;
 
-use core::ops::ControlFlow;
-
 use painleve_shared::contact::ScaledRow;
 use painleve_shared::{Arm, Posture, Real};
 
@@ -50,8 +48,8 @@ pub struct Stretch {
 #[derive(Clone, Copy, Debug)]
 #[repr(C)]
 pub struct EdgeGovernor {
-    /// The admissible stretch around the tip.
-    stretch: Stretch,
+    /// The admissible stretch around the tip, as far as it has been found.
+    pub stretch: Stretch,
     search: Search,
     /// Posture for which it looks, and the least ratio p/Q22 that it requires beyond the setting; `None` before the first.
     searched_for: Option<(Posture, f32)>,
@@ -62,8 +60,8 @@ pub struct EdgeGovernor {
     velocity_m_s: f32,
     /// Whether it was equal to the given reference.
     follows: bool,
-    /// Whether the given reference is beyond an edge.
-    at_edge: bool,
+    /// Whether the given reference is beyond an edge, which holds it back.
+    pub at_edge: bool,
     settings: GovernorSettings,
     tick_s: f32,
     distance_m: f32,
@@ -98,11 +96,6 @@ impl EdgeGovernor {
         self.follows = false;
     }
 
-    /// Returns the admissible stretch, as far as it has been found.
-    pub fn stretch(&self) -> Stretch {
-        self.stretch
-    }
-
     /// Returns whether both edges have been found for this posture and least p/Q22.
     pub fn has_edges_for(&self, posture: Posture, landing_p_ratio: f32) -> bool {
         self.found && self.searched_for == Some((posture, landing_p_ratio))
@@ -116,11 +109,6 @@ impl EdgeGovernor {
     /// Returns the last reference at rest: the position to hold while nothing can follow.
     pub fn present(&self) -> TipReference {
         TipReference::at_rest(self.position_m)
-    }
-
-    /// Returns whether an edge holds the reference back.
-    pub fn is_at_edge(&self) -> bool {
-        self.at_edge
     }
 
     /// Continues the search for the edges around a tip at `tip_t_m` (m). Where a thrown tip may land,
@@ -149,9 +137,8 @@ impl EdgeGovernor {
             self.search = Search::start(1.0, tip_t_m);
             self.found = false;
         }
-        let search = self.search;
-        let direction = search.direction;
-        let point_m = search.point(reach);
+        let direction = self.search.direction;
+        let point_m = self.search.point(reach);
         let worst_friction = friction.coefficient + self.settings.deviations * friction.deviation();
         let least_p_ratio = self.settings.p_ratio.at_least(landing_p_ratio);
         let there_m = point_m + direction * self.distance_m;
@@ -170,19 +157,13 @@ impl EdgeGovernor {
                 (q22 - worst_friction * against - least) / factor
             },
         );
-        let edge_m = match search.next(point_m, excess_per_kg, reach) {
-            ControlFlow::Continue(search) => {
-                self.search = search;
-                return;
-            }
-            ControlFlow::Break(edge_m) => edge_m,
+        let Some(edge_m) = self.search.next(point_m, excess_per_kg, reach) else {
+            return;
         };
         if direction > 0.0 {
             // Until the lower one is found, the edges stay in order.
-            self.stretch = Stretch {
-                lower_m: self.stretch.lower_m.at_most(edge_m),
-                upper_m: edge_m,
-            };
+            self.stretch.lower_m = self.stretch.lower_m.at_most(edge_m);
+            self.stretch.upper_m = edge_m;
         } else {
             // A stretch shorter than both margins shrinks to a point.
             self.stretch.lower_m = edge_m.at_most(self.stretch.upper_m);
@@ -198,10 +179,7 @@ impl EdgeGovernor {
             self.position_m = wanted.position_m;
             return *wanted;
         }
-        let Stretch {
-            lower_m: lower,
-            upper_m: upper,
-        } = self.stretch;
+        let (lower, upper) = (self.stretch.lower_m, self.stretch.upper_m);
         let outside = |position: f32| position > upper || position < lower;
         let speed = wanted.velocity_m_s;
         let stop_m = wanted.position_m + 0.5 * speed * speed.abs() / braking_m_s2;

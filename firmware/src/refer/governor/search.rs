@@ -1,7 +1,5 @@
 //! Searches for one end of the admissible stretch, one point of the belt at a time.
 
-use core::ops::ControlFlow;
-
 use painleve_shared::Real;
 
 /// Number of points from one end of the reach to the other in the outward search.
@@ -73,62 +71,48 @@ impl Search {
         point.within(reach_m)
     }
 
-    /// Returns the search after the point has been evaluated, or the edge (m) once it is found.
-    pub(super) fn next(
-        self,
-        point_m: f32,
-        excess_per_kg: f32,
-        reach_m: f32,
-    ) -> ControlFlow<f32, Self> {
+    /// Takes in how much p exceeds its least value at the point; returns the edge (m) once it is found.
+    pub(super) fn next(&mut self, point_m: f32, excess_per_kg: f32, reach_m: f32) -> Option<f32> {
         let is_inside = excess_per_kg >= 0.0;
-        let (inside_m, stage) = match self.stage {
-            Stage::Entering { .. } if is_inside => (point_m, Stage::Marching),
+        match &mut self.stage {
+            Stage::Marching if is_inside && point_m.abs() >= reach_m => return Some(point_m),
+            Stage::Entering { .. } | Stage::Marching if is_inside => {
+                self.inside_m = point_m;
+                self.stage = Stage::Marching;
+            }
             Stage::Entering {
                 refused,
                 best_m,
                 most_per_kg,
             } => {
-                let is_best = excess_per_kg > most_per_kg;
-                let best_m = if is_best { point_m } else { best_m };
-                if refused >= MOST_REFUSED {
-                    // No point is admissible: the best one.
-                    return ControlFlow::Break(best_m);
+                if excess_per_kg > *most_per_kg {
+                    *best_m = point_m;
                 }
-                let entering = Stage::Entering {
-                    refused: refused + 1,
-                    best_m,
-                    most_per_kg: excess_per_kg.at_least(most_per_kg),
-                };
-                (self.inside_m, entering)
+                if *refused >= MOST_REFUSED {
+                    // No point is admissible: the best one.
+                    return Some(*best_m);
+                }
+                *refused += 1;
+                *most_per_kg = excess_per_kg.at_least(*most_per_kg);
             }
-            Stage::Marching if is_inside && point_m.abs() >= reach_m => {
-                return ControlFlow::Break(point_m);
-            }
-            Stage::Marching if is_inside => (point_m, Stage::Marching),
             Stage::Marching => {
-                let halving = Stage::Halving {
+                self.stage = Stage::Halving {
                     beyond_m: point_m,
                     times: 0,
                 };
-                (self.inside_m, halving)
             }
             Stage::Halving { beyond_m, times } => {
-                let (inside_m, beyond_m) = if is_inside {
-                    (point_m, beyond_m)
+                if is_inside {
+                    self.inside_m = point_m;
                 } else {
-                    (self.inside_m, point_m)
-                };
-                let times = times + 1;
-                if times >= HALVINGS {
-                    return ControlFlow::Break(inside_m);
+                    *beyond_m = point_m;
                 }
-                (inside_m, Stage::Halving { beyond_m, times })
+                *times += 1;
+                if *times >= HALVINGS {
+                    return Some(self.inside_m);
+                }
             }
-        };
-        ControlFlow::Continue(Self {
-            inside_m,
-            stage,
-            ..self
-        })
+        }
+        None
     }
 }

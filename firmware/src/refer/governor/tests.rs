@@ -62,7 +62,7 @@ fn searched(tip_t_m: f32, posture: Posture, friction: &FrictionEstimate) -> Edge
 fn the_edges_are_those_of_table_ii() {
     let friction = known(0.6, Slip::Positive);
     for (posture, edge) in [(Posture::ElbowUp, 0.182_68), (Posture::ElbowDown, 0.164_71)] {
-        let found = searched(-0.1, posture, &friction).stretch();
+        let found = searched(-0.1, posture, &friction).stretch;
         assert!(
             (found.upper_m - edge).abs() < 2e-5,
             "{posture:?}: {found:?}"
@@ -86,7 +86,7 @@ fn a_reach_that_shrinks_during_a_search_does_not_hold_it_up() {
             let arm = if tick < shortened_at { arm() } else { shorter };
             governor.search(&arm, Posture::ElbowDown, -0.02, &friction, 0.0);
         }
-        let found = governor.stretch();
+        let found = governor.stretch;
         let reach_m = shorter.reach_on_belt_m();
         assert!(
             -reach_m < found.lower_m && found.upper_m < reach_m,
@@ -103,7 +103,7 @@ fn distance_m(configuration: &Configuration, landing: f32) -> f32 {
         let posture = Posture::ElbowDown;
         governor.search(&arm(), posture, -0.1, &friction, landing);
     }
-    0.164_71 - governor.stretch().upper_m
+    0.164_71 - governor.stretch.upper_m
 }
 
 #[test]
@@ -170,7 +170,7 @@ fn the_distance_grows_with_the_square_of_the_period() {
 fn a_tip_beyond_the_edge_is_led_back_to_the_stretch_next_to_it() {
     let friction = known(0.6, Slip::Positive);
     let upper_m = searched(0.18, Posture::ElbowDown, &friction)
-        .stretch()
+        .stretch
         .upper_m;
     assert!((upper_m - 0.164_71).abs() < 2e-5, "{upper_m}");
 }
@@ -188,7 +188,7 @@ fn without_an_admissible_place_nearby_the_tip_is_led_to_the_best_one_and_not_acr
     for _ in 0..3000 {
         governor.search(&arm(), Posture::ElbowDown, tip_t_m, &friction, 0.0);
         if governor.has_edges_for(Posture::ElbowDown, 0.0) {
-            let Stretch { lower_m, upper_m } = governor.stretch();
+            let Stretch { lower_m, upper_m } = governor.stretch;
             tip_t_m += (tip_t_m.max(lower_m).min(upper_m) - tip_t_m).clamp(-1e-3, 1e-3);
         }
     }
@@ -210,7 +210,7 @@ fn the_best_place_is_the_same_for_every_tip_or_the_tips_own() {
             for _ in 0..30 {
                 governor.search(&arm(), Posture::ElbowDown, tip_t_m, &friction, 0.0);
             }
-            let Stretch { lower_m, upper_m } = governor.stretch();
+            let Stretch { lower_m, upper_m } = governor.stretch;
             assert_eq!(lower_m, upper_m, "{tip_t_m}");
             (upper_m != tip_t_m).then_some(upper_m)
         });
@@ -255,8 +255,8 @@ fn ramp(from: f32, speed: f32, end: f32) -> impl Fn(f32) -> TipReference {
 proptest! {
     #[test]
     fn edges_mirror_with_posture_and_slip(friction in 0.4_f32..1.0, tip in -0.1_f32..0.0) {
-        let here = searched(tip, Posture::ElbowDown, &known(friction, Slip::Positive)).stretch();
-        let there = searched(-tip, Posture::ElbowUp, &known(friction, Slip::Negative)).stretch();
+        let here = searched(tip, Posture::ElbowDown, &known(friction, Slip::Positive)).stretch;
+        let there = searched(-tip, Posture::ElbowUp, &known(friction, Slip::Negative)).stretch;
         prop_assert!((here.upper_m + there.lower_m).abs() < 3e-5);
         prop_assert!((here.lower_m + there.upper_m).abs() < 3e-5);
     }
@@ -267,9 +267,9 @@ proptest! {
     ) {
         let mut governor = searched(0.0, Posture::ElbowDown, &known(0.6, Slip::Positive));
         governor.restart(0.0);
-        let edge = governor.stretch().upper_m;
+        let edge = governor.stretch.upper_m;
         let (last, largest) = follow(&mut governor, ramp(0.0, speed, end));
-        prop_assert!(governor.is_at_edge());
+        prop_assert!(governor.at_edge);
         prop_assert!(largest < edge + 1e-4, "{} {}", largest, edge);
         prop_assert!((last.position_m - edge).abs() < 1e-4 && last.velocity_m_s.abs() < 1e-3);
     }
@@ -283,7 +283,7 @@ proptest! {
         let (last, _) = follow(&mut governor, ramp(-0.15, speed, end));
         let wanted = ramp(-0.15, speed, end)(7.999);
         prop_assert!((last.position_m - wanted.position_m).abs() < 1e-4, "{:?} {:?}", last, wanted);
-        prop_assert!(!governor.is_at_edge());
+        prop_assert!(!governor.at_edge);
     }
 }
 
@@ -328,7 +328,7 @@ fn edges_of_the_other_posture_are_forgotten() {
     assert!(!governor.has_edges_for(Posture::ElbowUp, 0.0));
     // A tip that had moved on to another place.
     governor.search(&arm(), Posture::ElbowDown, 0.05, &friction, 0.0);
-    let Stretch { lower_m, upper_m } = governor.stretch();
+    let Stretch { lower_m, upper_m } = governor.stretch;
     assert!(lower_m < 0.05 && upper_m > 0.05 && upper_m - lower_m < 0.005);
 }
 
@@ -345,7 +345,7 @@ fn of_places_that_are_all_out_of_reach_the_innermost_is_the_best() {
         for _ in 0..30 {
             governor.search(&arm(), Posture::ElbowDown, tip_t_m, &friction, 0.0);
         }
-        let Stretch { lower_m, upper_m } = governor.stretch();
+        let Stretch { lower_m, upper_m } = governor.stretch;
         assert!(
             lower_m.abs().max(upper_m.abs()) < tip_t_m.abs(),
             "{lower_m} {upper_m}"
@@ -376,7 +376,7 @@ fn a_governor_that_is_off_passes_any_reference_on() {
     }
     let beyond = TipReference::at_rest(0.2);
     assert_eq!(governor.govern(&beyond), beyond);
-    assert!(!governor.is_at_edge());
+    assert!(!governor.at_edge);
     // There the reference of a thrown tip waits.
     assert_eq!(governor.present(), beyond);
 }
@@ -392,8 +392,8 @@ fn edges_stay_in_order_where_the_tip_has_crossed_one() {
     };
     for _ in 0..300 {
         crossed.search(&arm(), Posture::ElbowDown, -0.1, &friction, 0.0);
-        let Stretch { lower_m, upper_m } = crossed.stretch();
+        let Stretch { lower_m, upper_m } = crossed.stretch;
         assert!(lower_m <= upper_m, "{lower_m} {upper_m}");
     }
-    assert_eq!(crossed.stretch(), governor.stretch());
+    assert_eq!(crossed.stretch, governor.stretch);
 }
