@@ -15,7 +15,7 @@ pub struct TorqueDemand<L: Law> {
     law_state: L::State,
     /// The recovery in progress.
     pub flight: Option<Flight>,
-    law: L,
+    pub(crate) law: L,
     recovery: RecoverySettings,
     tick_s: f32,
     torque_limit_nm: f32,
@@ -37,11 +37,6 @@ impl<L: Law> TorqueDemand<L> {
         }
     }
 
-    /// Whether there is a law: without one the drive never arms.
-    pub fn is_on(&self) -> bool {
-        self.law.is_on()
-    }
-
     /// Returns the torque that this tick demands, and the contact force that it is meant to cause. `saturated` states
     /// whether the torque until now was limited.
     #[inline]
@@ -52,12 +47,7 @@ impl<L: Law> TorqueDemand<L> {
         target: &Target,
         saturated: bool,
     ) -> LawOutput {
-        let Estimators {
-            arm,
-            model,
-            contact,
-            ..
-        } = estimates;
+        let (arm, model, contact) = (&estimates.arm, &estimates.model, &estimates.contact);
         if target.recovering {
             let stretch = target.edges_for_landing.then_some(target.stretch);
             let flight = &mut self.flight;

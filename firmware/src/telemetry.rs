@@ -1,21 +1,15 @@
 //! Internal state of the controller at its last tick, in SI units.
 
-use painleve_shared::status::{Fault, SupervisorState};
 use painleve_shared::{JointTorque, LinkMotion, Slip};
 
 use crate::estimate::Estimators;
 use crate::last_command::LastCommand;
 use crate::refer::Target;
-use crate::supervise::supervisor::Supervisor;
 
 /// A snapshot for logs and displays. No part of the controller's behaviour depends on it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Telemetry {
-    /// Supervisor state.
-    pub state: SupervisorState,
-    /// Latched fault.
-    pub fault: Option<Fault>,
     /// Estimated link angles θ1, θ2, rad.
     pub theta_rad: LinkMotion<f32>,
     /// Estimated rates of the link angles, rad/s.
@@ -64,12 +58,10 @@ impl Telemetry {
         estimates: &Estimators,
         target: &Target,
         command: &LastCommand,
-        supervisor: &Supervisor,
+        recovering: bool,
     ) {
         let (model, contact) = (&estimates.model, &estimates.contact);
         *self = Self {
-            state: supervisor.state(),
-            fault: supervisor.fault(),
             theta_rad: model.theta_rad,
             theta_dot_rad_s: model.theta_dot_rad_s,
             tip_t_m: model.tip_m.x,
@@ -86,22 +78,17 @@ impl Telemetry {
             sticks: contact.friction.sticks,
             edges_m: [target.stretch.lower_m, target.stretch.upper_m],
             at_edge: target.at_edge,
-            recovering: target.recovering && supervisor.drives(),
+            recovering,
             saturated: command.saturated,
             saturated_ticks: self.saturated_ticks.wrapping_add(command.saturated.into()),
         };
     }
 
     /// Records that the torque has been taken off without a tick.
-    pub(crate) fn stop(&mut self, supervisor: &Supervisor) {
-        *self = Self {
-            state: supervisor.state(),
-            fault: supervisor.fault(),
-            torque_nm: JointTorque::zeros(),
-            at_edge: false,
-            recovering: false,
-            saturated: false,
-            ..*self
-        };
+    pub(crate) fn stop(&mut self) {
+        self.torque_nm = JointTorque::zeros();
+        self.at_edge = false;
+        self.recovering = false;
+        self.saturated = false;
     }
 }

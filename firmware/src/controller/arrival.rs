@@ -2,9 +2,9 @@
 
 use painleve_shared::frame::SensorFrame;
 
-use crate::estimate::Estimators;
+use super::Controller;
+use crate::law::Law;
 use crate::supervise::lapses::{BOARD_LAPSES, Lapse};
-use crate::supervise::supervisor::Supervisor;
 
 /// Result of the checks of a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -25,84 +25,71 @@ pub(super) struct ArrivalState {
     unread_ticks: u32,
 }
 
-/// Checks a frame before its readings are used, and records its lapses.
-#[inline]
-pub(super) fn arrive(
-    state: &mut ArrivalState,
-    supervisor: &mut Supervisor,
-    estimates: &Estimators,
-    frame: &SensorFrame,
-) -> Arrival {
-    let last = state
-        .last_sequence
-        .unwrap_or(frame.sequence.wrapping_sub(1));
-    let ahead = frame.sequence.wrapping_sub(last);
-    if ahead != 1
-        || !estimates.can_read_encoders(frame)
-        || !estimates.can_read_forces(frame)
-        || BOARD_LAPSES
-            .iter()
-            .any(|(input, _)| frame.inputs.contains(*input))
-    {
-        return irregular(state, supervisor, estimates, frame, ahead);
-    }
-    state.last_sequence = Some(frame.sequence);
-    for lapse in Lapse::OF_FRAMES {
-        supervisor.note(*lapse, 0);
-    }
-    Arrival::After(1 + core::mem::take(&mut state.unread_ticks))
-}
-
-/// Handles a frame that is out of sequence, has readings out of range, or reports faults of the board. The answer to it
-/// takes the torque off if this latches a fault.
-#[cold]
-#[inline(never)]
-fn irregular(
-    state: &mut ArrivalState,
-    supervisor: &mut Supervisor,
-    estimates: &Estimators,
-    frame: &SensorFrame,
-    ahead: u32,
-) -> Arrival {
-    let (encoders, forces) = (
-        estimates.can_read_encoders(frame),
-        estimates.can_read_forces(frame),
-    );
-    // One latch after all of them: a call for each would add to the bound on a tick.
-    let mut first = None;
-    let mut note = |lapse: Lapse, times: u32| {
-        if supervisor.lapses.note(lapse, times) && first.is_none() {
-            first = Some(lapse);
+impl<L: Law> Controller<L> {
+    /// Checks a frame before its readings are used, and records its lapses.
+    #[inline]
+    pub(super) fn arrive(&mut self, frame: &SensorFrame) -> Arrival {
+        let state = &mut self.arrivals;
+        let last = state
+            .last_sequence
+            .unwrap_or(frame.sequence.wrapping_sub(1));
+        let ahead = frame.sequence.wrapping_sub(last);
+        let (encoders, forces) = self.estimates.can_read(frame);
+        let mut reports = BOARD_LAPSES.iter().map(|(input, _)| *input);
+        let is_reported = reports.any(|input| frame.inputs.contains(input));
+        if ahead != 1 || !encoders || !forces || is_reported {
+            return self.irregular(frame, ahead);
         }
-    };
-    for (input, lapse) in BOARD_LAPSES {
-        note(lapse, u32::from(frame.inputs.contains(input)));
-    }
-    // More than half the counter's range ahead means behind.
-    let stale = ahead == 0 || ahead > u32::MAX / 2;
-    note(Lapse::StaleFrame, u32::from(stale));
-    let arrival = if stale {
-        Arrival::Stale
-    } else {
-        note(Lapse::LostFrame, ahead - 1);
-        note(Lapse::EncoderOutOfRange, u32::from(!encoders));
-        note(Lapse::ForceOutOfRange, u32::from(!forces));
-        let ticks = ahead.saturating_add(state.unread_ticks);
-        if encoders && forces {
-            state.unread_ticks = 0;
-            Arrival::After(ticks)
-        } else {
-            state.unread_ticks = ticks.min(u32::MAX / 2);
-            Arrival::OutOfRange
-        }
-    };
-    if let Some(lapse) = first {
-        supervisor.latch(lapse.fault());
-    }
-    // A sender that has started anew counts from another number: follow it once its frames have latched a fault, so that
-    // it can reset the fault.
-    if !stale || supervisor.fault().is_some() {
         state.last_sequence = Some(frame.sequence);
+        for lapse in Lapse::OF_FRAMES {
+            self.supervisor.note(*lapse, 0);
+        }
+        Arrival::After(1 + core::mem::take(&mut state.unread_ticks))
     }
-    arrival
+
+    /// Handles a frame that is out of sequence, has readings out of range, or reports faults of the board. The answer to it
+    /// takes the torque off if this latches a fault.
+    #[cold]
+    #[inline(never)]
+    fn irregular(&mut self, frame: &SensorFrame, ahead: u32) -> Arrival {
+        let (state, supervisor) = (&mut self.arrivals, &mut self.supervisor);
+        let (encoders, forces) = self.estimates.can_read(frame);
+        // One latch after all of them: a call for each would add to the bound on a tick.
+        let mut first = None;
+        let mut note = |lapse: Lapse, times: u32| {
+            if supervisor.lapses.note(lapse, times) && first.is_none() {
+                first = Some(lapse);
+            }
+        };
+        for (input, lapse) in BOARD_LAPSES {
+            note(lapse, u32::from(frame.inputs.contains(input)));
+        }
+        // More than half the counter's range ahead means behind.
+        let stale = ahead == 0 || ahead > u32::MAX / 2;
+        note(Lapse::StaleFrame, u32::from(stale));
+        let arrival = if stale {
+            Arrival::Stale
+        } else {
+            note(Lapse::LostFrame, ahead - 1);
+            note(Lapse::EncoderOutOfRange, u32::from(!encoders));
+            note(Lapse::ForceOutOfRange, u32::from(!forces));
+            let ticks = ahead.saturating_add(state.unread_ticks);
+            if encoders && forces {
+                state.unread_ticks = 0;
+                Arrival::After(ticks)
+            } else {
+                state.unread_ticks = ticks.min(u32::MAX / 2);
+                Arrival::OutOfRange
+            }
+        };
+        if let Some(lapse) = first {
+            supervisor.latch(lapse.fault());
+        }
+        // A sender that has started anew counts from another number: follow it once its frames have latched a fault, so that
+        // it can reset the fault.
+        if !stale || supervisor.fault().is_some() {
+            state.last_sequence = Some(frame.sequence);
+        }
+        arrival
+    }
 }

@@ -23,12 +23,29 @@ use painleve_shared::counts::TorqueCounts;
 use painleve_shared::frame::{ActuatorFrame, DigitalInputs, SensorFrame, StatusFlags};
 use painleve_shared::range::OutOfRange;
 
-use self::arrival::{Arrival, arrive};
-use self::stages::{Stages, report};
+use self::arrival::{Arrival, ArrivalState};
 use crate::configuration::Configuration;
+use crate::demand::TorqueDemand;
+use crate::estimate::belt::BeltEstimator;
+use crate::estimate::calibration::LengthCalibrator;
+use crate::estimate::contact::ContactDetector;
+use crate::estimate::disturbance::DisturbanceEstimator;
+use crate::estimate::friction::{FrictionEstimate, FrictionEstimator};
+use crate::estimate::joint_friction::JointFriction;
+use crate::estimate::joints::{JointEstimator, JointEstimatorSettings};
+use crate::estimate::model::Model;
+use crate::estimate::response::ResponseEstimator;
+use crate::estimate::{ContactEstimate, Estimators, Observed};
+use crate::last_command::LastCommand;
 use crate::law::{Law, LawSettings};
+use crate::refer::References;
+use crate::refer::governor::EdgeGovernor;
+use crate::refer::reference::ReferenceGenerator;
+use crate::schedule::Turn;
 use crate::supervise::lapses::{Lapse, LapseMonitor};
+use crate::supervise::supervisor::Supervisor;
 use crate::telemetry::Telemetry;
+use crate::torque_output::TorqueOutput;
 
 /// The controller of one arm, with the laws `L`.
 ///
@@ -80,7 +97,19 @@ use crate::telemetry::Telemetry;
 #[repr(C)]
 pub struct Controller<L: Law = LawSettings> {
     last_answer: ActuatorFrame,
-    stages: Stages<L>,
+    command: LastCommand,
+    demand: TorqueDemand<L>,
+    torques: TorqueOutput,
+    /// What is known of arm, contact and belt.
+    estimates: Estimators,
+    references: References,
+    /// Whether the arm is driven, and the latched fault.
+    supervisor: Supervisor,
+    /// The tick that has been answered, for its update.
+    observed: Observed,
+    turn: Turn,
+    /// What has arrived.
+    arrivals: ArrivalState,
     due: Due,
 }
 
@@ -103,10 +132,49 @@ impl<L: Law> Controller<L> {
     /// [`OutOfRange`] naming the first key that is out of range.
     pub fn new(configuration: &Configuration<L>) -> Result<Self, OutOfRange> {
         let arm = configuration.validate()?;
+        let (converters, settings) = (&configuration.converters, &configuration.settings);
+        let speed = configuration.loop_speed(&arm);
+        let joints = JointEstimatorSettings {
+            bandwidth_rad_s: speed * settings.estimator.bandwidth_rad_s,
+            ..settings.estimator
+        };
+        let (tick_hz, tick_s) = (configuration.tick_hz, configuration.tick_s());
+        let torque_limit_nm = settings.torque_limit_nm;
+        let torques = TorqueOutput::new(converters.torque, torque_limit_nm);
+        let force_cell = converters.force.converter();
+        let estimates = Estimators {
+            contact: ContactEstimate {
+                friction: FrictionEstimate::first(&settings.friction),
+                ..ContactEstimate::default()
+            },
+            model: Model::default(),
+            arm,
+            joints: JointEstimator::new(&joints, converters.encoders, tick_hz),
+            detector: ContactDetector::new(&settings.contact),
+            friction_filter: FrictionEstimator::new(&settings.friction, &settings.contact, tick_s),
+            belt: BeltEstimator::new(&settings.belt, tick_s),
+            response: ResponseEstimator::new(&settings.response, tick_s),
+            disturbance: DisturbanceEstimator::new(&settings.disturbance, torque_limit_nm, tick_s),
+            calibrator: LengthCalibrator::new(&settings.calibration, &arm, Turn::COUNT * tick_s),
+            joint_friction: JointFriction::new(configuration.arm.coulomb_friction_nm),
+            force_cell,
+            force_range_n: force_cell.value(force_cell.maximum_counts),
+        };
+        let (kept_m, reach_m) = (configuration.kept_distance_m(), arm.reach_on_belt_m());
+        let governor = EdgeGovernor::new(&settings.governor, tick_s, kept_m, reach_m);
+        let generator = ReferenceGenerator::new(&settings.reference, tick_hz);
         Ok(Self {
             last_answer: ActuatorFrame::default(),
-            stages: Stages::new(configuration, arm),
             due: Due::Nothing,
+            estimates,
+            command: LastCommand::default(),
+            demand: TorqueDemand::new(configuration, speed, torques.limit_nm()),
+            supervisor: Supervisor::new(settings.supervisor, settings.lapses, tick_hz),
+            references: References::new(governor, generator, settings.recovery.minimum_p_ratio),
+            observed: Observed::default(),
+            turn: Turn::default(),
+            arrivals: ArrivalState::default(),
+            torques,
         })
     }
 
@@ -150,9 +218,9 @@ impl<L: Law> Controller<L> {
         match core::mem::take(&mut self.due) {
             Due::Nothing => return,
             Due::Preparation => {}
-            Due::Everything => self.stages.learn(),
+            Due::Everything => self.learn(),
         }
-        self.stages.prepare();
+        self.prepare();
     }
 
     #[cold]
@@ -166,7 +234,7 @@ impl<L: Law> Controller<L> {
     /// output at once.
     #[inline]
     pub fn note(&mut self, lapse: Lapse, times: u32) -> Option<ActuatorFrame> {
-        self.stages.supervisor.note(lapse, times).then(|| {
+        self.supervisor.note(lapse, times).then(|| {
             self.stop(None);
             self.last_answer
         })
@@ -174,12 +242,12 @@ impl<L: Law> Controller<L> {
 
     /// Returns how often each kind of lapse has occurred.
     pub fn lapses(&self) -> &LapseMonitor {
-        &self.stages.supervisor.lapses
+        &self.supervisor.lapses
     }
 
-    /// Returns the same, for a drive that stands in for the controller.
-    pub(crate) fn lapses_mut(&mut self) -> &mut LapseMonitor {
-        &mut self.stages.supervisor.lapses
+    /// Returns supervisor and last answer, for a drive that stands in for the controller.
+    pub(crate) fn stand_in(&mut self) -> (&mut Supervisor, &mut ActuatorFrame) {
+        (&mut self.supervisor, &mut self.last_answer)
     }
 
     #[inline]
@@ -187,23 +255,11 @@ impl<L: Law> Controller<L> {
         if !matches!(self.due, Due::Nothing) {
             self.catch_up();
         }
-        let Stages {
-            estimates,
-            supervisor,
-            arrivals,
-            ..
-        } = &mut self.stages;
-        match arrive(arrivals, supervisor, estimates, frame) {
-            Arrival::After(elapsed_ticks) => {
-                let answer = &mut self.last_answer;
-                let followed = self.stages.answer(frame, elapsed_ticks, answer, telemetry);
-                self.due = match followed {
-                    Ok(()) => Due::Everything,
-                    Err(_) => Due::Preparation,
-                };
-            }
+        match self.arrive(frame) {
+            Arrival::After(elapsed_ticks) => self.follow(frame, elapsed_ticks, telemetry),
             // Without new readings, the last torque stays for a limited number of ticks.
             arrival => {
+                let supervisor = &mut self.supervisor;
                 if arrival == Arrival::OutOfRange {
                     self.due = Due::Preparation;
                     if supervisor.drives() && !frame.inputs.contains(DigitalInputs::ENABLE) {
@@ -223,15 +279,15 @@ impl<L: Law> Controller<L> {
     #[cold]
     #[inline(never)]
     fn stop(&mut self, telemetry: Option<&mut Telemetry>) {
-        self.stages.release();
+        self.release();
         let answer = &mut self.last_answer;
         answer.torques = [TorqueCounts(0); 2];
-        report(answer, &self.stages.supervisor);
+        self.supervisor.report(answer);
         answer
             .flags
             .remove(StatusFlags::SATURATED | StatusFlags::AT_EDGE | StatusFlags::RECOVERING);
         if let Some(telemetry) = telemetry {
-            telemetry.stop(&self.stages.supervisor);
+            telemetry.stop();
         }
     }
 }

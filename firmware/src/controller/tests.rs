@@ -340,16 +340,16 @@ fn turned_by_hand(counts_at: impl Fn(u32) -> i32) -> (Controller, SensorFrame) {
 
 #[test]
 fn a_tip_that_somebody_presses_while_the_drive_is_off_shows_no_length() {
-    let before = tracking().stages.estimates.arm.link_length_m();
+    let before = tracking().estimates.arm.link_length_m();
     // Readings that change, away from the belt.
     let (controller, _) = turned_by_hand(|tick| -200 - (tick as i32 % 3));
-    assert_eq!(controller.stages.estimates.arm.link_length_m(), before);
+    assert_eq!(controller.estimates.arm.link_length_m(), before);
 }
 
 #[test]
 fn a_joint_turned_once_around_while_the_drive_is_off_is_where_it_was() {
     let (mut controller, last) = turned_by_hand(|tick| 16_384.min(10 * tick as i32));
-    let theta = controller.stages.estimates.model.theta_rad.first();
+    let theta = controller.estimates.model.theta_rad.first();
     assert!((theta - (-11.4_f32).to_radians()).abs() < 1e-3, "{theta}");
     let enabled = SensorFrame {
         tick: last.tick + 1,
@@ -369,7 +369,7 @@ fn torques_learnt_before_the_drive_was_off_are_forgotten() {
             ..frame(tick)
         });
     }
-    let learnt_nm = |controller: &Controller| controller.stages.estimates.disturbance.torque_nm;
+    let learnt_nm = |controller: &Controller| controller.estimates.disturbance.torque_nm;
     assert!(learnt_nm(&controller).amax() > 0.1);
     for tick in 520..523 {
         controller.tick(&SensorFrame {

@@ -9,7 +9,8 @@ use painleve_shared::status::{Fault, SupervisorState};
 
 use crate::configuration::Configuration;
 use crate::law::Law;
-use crate::supervise::lapses::{BOARD_LAPSES, Lapse, LapseMonitor};
+use crate::supervise::lapses::{BOARD_LAPSES, Lapse};
+use crate::supervise::supervisor::Supervisor;
 use crate::torque_output::TorqueOutput;
 
 /// Time after which a torque that is not repeated expires, s.
@@ -31,7 +32,6 @@ pub struct OpenLoop {
     age: u32,
     /// Readings when the drive was armed; `None` while it is not.
     armed_at: Option<[EncoderCounts; 2]>,
-    last: ActuatorFrame,
 }
 
 impl OpenLoop {
@@ -47,7 +47,6 @@ impl OpenLoop {
             torques: [TorqueCounts(0); 2],
             age: 0,
             armed_at: None,
-            last: ActuatorFrame::default(),
         }
     }
 
@@ -59,67 +58,42 @@ impl OpenLoop {
         }
     }
 
-    /// Answers one sensor frame, and counts its lapses.
+    /// Answers one sensor frame in place of the controller, which does not run, and notes its lapses.
     // Out of line: it must not take the place of the law in the control interrupt.
     #[cold]
     #[inline(never)]
-    pub fn tick(&mut self, frame: &SensorFrame, lapses: &mut LapseMonitor) -> &ActuatorFrame {
-        let is_enabled = frame.inputs.contains(DigitalInputs::ENABLE) && self.last.fault == 0;
+    pub fn tick<'a>(
+        &mut self,
+        frame: &SensorFrame,
+        (supervisor, answer): (&mut Supervisor, &'a mut ActuatorFrame),
+    ) -> &'a ActuatorFrame {
+        let is_enabled = frame.inputs.contains(DigitalInputs::ENABLE);
         let is_readable = frame.joints.iter().all(|it| self.encoder.contains(*it));
         match self.armed_at {
-            _ if !is_enabled => self.release(),
+            _ if !is_enabled || supervisor.fault().is_some() => self.armed_at = None,
             Some(start) if self.has_moved_far(start, frame.joints) => {
-                self.latch(Fault::MovedTooFar);
+                supervisor.latch(Fault::MovedTooFar);
             }
-            Some(_) => self.note_lapses(lapses, frame.inputs, is_readable),
+            Some(_) => Self::note_lapses(supervisor, frame.inputs, is_readable),
             // A missing reading shows no motion from it.
             None if is_readable => self.armed_at = Some(frame.joints),
             None => {}
         }
+        if supervisor.fault().is_some() {
+            self.armed_at = None;
+        }
         self.age = self.age.saturating_add(1);
-        if self.age > self.lifetime {
+        if self.armed_at.is_none() || self.age > self.lifetime {
             self.torques = [TorqueCounts(0); 2];
         }
-        self.last.tick = frame.tick;
-        self.last.sequence = self.last.sequence.wrapping_add(1);
-        self.report();
-        &self.last
-    }
-
-    /// Returns the last answer.
-    pub fn last_answer(&self) -> &ActuatorFrame {
-        &self.last
-    }
-
-    /// Takes the torque off until the next configuration, and returns the answer that says so.
-    #[cold]
-    #[inline(never)]
-    pub fn latch(&mut self, fault: Fault) -> ActuatorFrame {
-        if self.last.fault == 0 {
-            self.last.fault = fault as u8;
+        answer.tick = frame.tick;
+        answer.sequence = answer.sequence.wrapping_add(1);
+        answer.torques = self.torques;
+        supervisor.report(answer);
+        if self.armed_at.is_some() {
+            answer.state = SupervisorState::Armed as u8;
         }
-        self.release();
-        self.report();
-        self.last
-    }
-
-    /// Latches the fault of a lapse that occurs too often, in place of the controller, which does not run. Forces are
-    /// not needed here.
-    fn note_lapses(&mut self, lapses: &mut LapseMonitor, inputs: DigitalInputs, is_readable: bool) {
-        let mut note = |lapse: Lapse, occurs: bool| {
-            if lapses.note(lapse, u32::from(occurs)) {
-                self.latch(lapse.fault());
-            }
-        };
-        note(Lapse::EncoderOutOfRange, !is_readable);
-        for (input, lapse) in BOARD_LAPSES {
-            note(lapse, inputs.contains(input));
-        }
-    }
-
-    fn release(&mut self) {
-        self.armed_at = None;
-        self.torques = [TorqueCounts(0); 2];
+        answer
     }
 
     /// Returns whether a joint has turned too far; a missing reading counts as no motion.
@@ -131,14 +105,12 @@ impl OpenLoop {
         })
     }
 
-    fn report(&mut self) {
-        let state = match self.armed_at {
-            _ if self.last.fault != 0 => SupervisorState::Fault,
-            Some(_) => SupervisorState::Armed,
-            None => SupervisorState::Idle,
-        };
-        self.last.torques = self.torques;
-        self.last.state = state as u8;
+    /// Notes lapses of a frame. Forces are not needed here.
+    fn note_lapses(supervisor: &mut Supervisor, inputs: DigitalInputs, is_readable: bool) {
+        supervisor.note(Lapse::EncoderOutOfRange, u32::from(!is_readable));
+        for (input, lapse) in BOARD_LAPSES {
+            supervisor.note(lapse, u32::from(inputs.contains(input)));
+        }
     }
 }
 
@@ -150,15 +122,17 @@ mod tests {
 
     const REQUEST: [TorqueCounts; 2] = [TorqueCounts(100), TorqueCounts(-2000)];
 
-    /// A drive in open loop, with the lapses that it counts.
+    /// A drive in open loop, with what it needs of the controller.
     struct Tested {
         open_loop: OpenLoop,
-        lapses: LapseMonitor,
+        supervisor: Supervisor,
+        answer: ActuatorFrame,
     }
 
     impl Tested {
         fn tick(&mut self, frame: &SensorFrame) -> &ActuatorFrame {
-            self.open_loop.tick(frame, &mut self.lapses)
+            let controller = (&mut self.supervisor, &mut self.answer);
+            self.open_loop.tick(frame, controller)
         }
 
         fn request(&mut self, torques: [TorqueCounts; 2]) {
@@ -174,7 +148,12 @@ mod tests {
         configuration.settings.torque_limit_nm = 1.0;
         Tested {
             open_loop: OpenLoop::new(&configuration),
-            lapses: LapseMonitor::new(configuration.settings.lapses),
+            supervisor: Supervisor::new(
+                configuration.settings.supervisor,
+                configuration.settings.lapses,
+                tick_hz,
+            ),
+            answer: ActuatorFrame::default(),
         }
     }
 
@@ -277,7 +256,10 @@ mod tests {
         let mut open_loop = open_loop();
         open_loop.tick(&frame(0, 100, DigitalInputs::ENABLE));
         open_loop.tick(&frame(1, u32::MAX, DigitalInputs::ENABLE));
-        assert_eq!(open_loop.lapses.total(Lapse::EncoderOutOfRange), 1);
+        assert_eq!(
+            open_loop.supervisor.lapses.total(Lapse::EncoderOutOfRange),
+            1
+        );
     }
 
     #[test]

@@ -193,7 +193,7 @@ impl<D: Drive, L: Law> ControlTask<D, L> {
             // In lockstep time stands still until a frame comes.
             let missing = u32::from(self.source != FrameSource::Lockstep);
             if let Some(stopped) = controller.note(Lapse::MissingFrame, missing) {
-                self.drive.actuate(&stop(&mut self.open_loop, stopped));
+                self.drive.actuate(&stopped);
                 self.elapsed = 0;
                 self.due = Due::Report;
             }
@@ -203,7 +203,7 @@ impl<D: Drive, L: Law> ControlTask<D, L> {
         let start = self.drive.stopwatch();
         let answer = match &mut self.open_loop {
             None => controller.answer(frame),
-            Some(open_loop) => open_loop.tick(frame, controller.lapses_mut()),
+            Some(open_loop) => open_loop.tick(frame, controller.stand_in()),
         };
         self.elapsed = self.drive.stopwatch().wrapping_sub(start);
         self.drive.actuate(answer);
@@ -234,13 +234,9 @@ impl<D: Drive, L: Law> ControlTask<D, L> {
             }
         }
         let controller = self.controller.as_ref()?;
-        let frame = match &self.open_loop {
-            None => controller.last_answer(),
-            Some(open_loop) => open_loop.last_answer(),
-        };
         Some(Answered {
             sensor: self.sensor.as_ref(),
-            frame,
+            frame: controller.last_answer(),
             elapsed: self.elapsed,
         })
     }
@@ -271,7 +267,7 @@ impl<D: Drive, L: Law> ControlTask<D, L> {
         if let Some(controller) = &mut self.controller
             && let Some(stopped) = controller.note(lapse, times)
         {
-            self.drive.actuate(&stop(&mut self.open_loop, stopped));
+            self.drive.actuate(&stopped);
         }
     }
 
@@ -298,14 +294,6 @@ impl<D: Drive, L: Law> ControlTask<D, L> {
     /// Returns the drive for changes, for example to offer it a frame.
     pub fn drive_mut(&mut self) -> &mut D {
         &mut self.drive
-    }
-}
-
-/// Latches the fault of a stopped controller in the open loop, too, and returns the answer.
-fn stop(open_loop: &mut Option<OpenLoop>, stopped: ActuatorFrame) -> ActuatorFrame {
-    match (open_loop, stopped.latched_fault()) {
-        (Some(open_loop), Some(fault)) => open_loop.latch(fault),
-        _ => stopped,
     }
 }
 

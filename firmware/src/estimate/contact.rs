@@ -67,7 +67,7 @@ pub struct EncoderReading {
 /// Weighs readings as evidence for contact or flight.
 #[derive(Clone, Copy, Debug)]
 pub struct ContactDetector {
-    settings: ContactSettings,
+    pub(super) settings: ContactSettings,
     /// f_c/σ², 1/N.
     slope_per_n: f32,
     /// The log-odds of contact, and the contact decision.
@@ -84,11 +84,6 @@ impl ContactDetector {
             log_odds: -DECISION,
             contact: false,
         }
-    }
-
-    /// Returns which readings decide.
-    pub fn evidence(&self) -> Evidence {
-        self.settings.evidence
     }
 
     /// Updates the decision with one tick's normal force from the force cell, N. Returns whether

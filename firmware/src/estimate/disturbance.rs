@@ -31,7 +31,7 @@ settings! {
 }
 
 /// The low-pass of the residual.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub struct DisturbanceEstimator {
     /// Fraction of the residual adopted at once far from the edge.
     weight: f32,
@@ -61,9 +61,7 @@ impl DisturbanceEstimator {
             weight: settings.bandwidth_rad_s * (Turn::COUNT * tick_s),
             limit_nm: LARGEST * torque_limit_nm,
             tick_s,
-            torque_nm: GeneralisedTorque::zeros(),
-            rate_rad_s: None,
-            acted: Acted::default(),
+            ..Self::default()
         }
     }
 

@@ -96,7 +96,7 @@ impl FrictionEstimate {
 }
 
 /// The filter with its settings. The estimate itself is part of what is known of the contact.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub struct FrictionEstimator {
     /// Normal force below which friction is not observed, N.
     observable_n: f32,
@@ -143,13 +143,10 @@ impl FrictionEstimator {
             first_variance,
             drift_variance: square(DRIFT_PER_SQRT_S) * tick_s,
             mean_weight: tick_s / (MEAN_S + tick_s),
-            contrary_ticks: 0,
             slip_in_doubt: true,
-            correction: None,
-            mean_innovation: 0.0,
-            innovation: 0.0,
             noise_variance: 1.0,
             reading_variance_n2: force_variance_n2,
+            ..Self::default()
         }
     }
 

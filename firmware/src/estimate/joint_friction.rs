@@ -15,7 +15,7 @@ const COMPENSATED: f32 = 0.85;
 #[derive(Clone, Copy, Debug)]
 pub struct JointFriction {
     /// Whether there is nothing to compensate.
-    is_zero: bool,
+    pub(super) is_zero: bool,
     /// Compensated Coulomb friction, N·m.
     coulomb_nm: [f32; 2],
     /// Joint angles at the last tick, rad; absent before the first.
@@ -34,12 +34,6 @@ impl JointFriction {
             angles_rad: None,
             torque_nm: JointTorque::zeros(),
         }
-    }
-
-    /// Returns whether there is nothing to compensate.
-    #[inline]
-    pub fn is_zero(&self) -> bool {
-        self.is_zero
     }
 
     /// Returns the change of the friction in one tick, as a torque on the links, N·m, given the joint angles q', rad.
@@ -92,7 +86,7 @@ mod tests {
 
     #[test]
     fn joints_without_friction_need_no_compensation() {
-        assert!(JointFriction::new([0.0; 2]).is_zero());
-        assert!(!JointFriction::new([0.0, 0.1]).is_zero());
+        assert!(JointFriction::new([0.0; 2]).is_zero);
+        assert!(!JointFriction::new([0.0, 0.1]).is_zero);
     }
 }

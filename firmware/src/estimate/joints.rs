@@ -49,7 +49,7 @@ pub enum Restart {
 }
 
 /// Estimator of both joints' angles q' = (θ1, θ2 − θ1) and rates, with its gains. The encoders have the same resolution.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct JointEstimator {
     settings: JointEstimatorSettings,
     scales: [EncoderScale; 2],
@@ -97,14 +97,7 @@ impl JointEstimator {
             tick_s,
             angle_gain: 1.0 - pole * pole,
             rate_gain_per_s,
-            readings: None,
-            counts: [0; 2],
-            correction_rad: JointMotion::zeros(),
-            angles_rad: JointMotion::zeros(),
-            rates_rad_s: JointMotion::zeros(),
-            innovation_rad: JointMotion::zeros(),
-            moved: false,
-            predicted_ticks: 0,
+            ..Self::default()
         }
     }
 

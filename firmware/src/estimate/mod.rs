@@ -79,17 +79,12 @@ pub struct Estimators {
 }
 
 impl Estimators {
-    /// Returns whether the encoders can give a frame's readings.
+    /// Returns whether the encoders, and whether the force cell, can give a frame's readings.
     #[inline]
-    pub fn can_read_encoders(&self, frame: &SensorFrame) -> bool {
-        self.joints.can_read(frame.joints)
-    }
-
-    /// Returns whether the force cell can give a frame's readings.
-    #[inline]
-    pub fn can_read_forces(&self, frame: &SensorFrame) -> bool {
-        let force_cell = &self.force_cell;
-        force_cell.contains(frame.normal_force.0) && force_cell.contains(frame.tangential_force.0)
+    pub fn can_read(&self, frame: &SensorFrame) -> (bool, bool) {
+        let forces = [frame.normal_force, frame.tangential_force];
+        let forces = forces.iter().all(|it| self.force_cell.contains(it.0));
+        (self.joints.can_read(frame.joints), forces)
     }
 
     /// Corrects the predicted state of the arm with a frame's readings, `elapsed_ticks` after the previous ones, and
@@ -110,10 +105,9 @@ impl Estimators {
             .correct(&frame.joints, elapsed_ticks, expected, &last.torque_nm);
         match followed {
             Ok(()) => {
-                let (theta_rad, theta_dot_rad_s) =
-                    (self.joints.theta_rad(), self.joints.theta_dot_rad_s());
-                self.model.move_to(&self.arm, theta_rad, theta_dot_rad_s);
-                if !self.joint_friction.is_zero() {
+                let (theta, theta_dot) = (self.joints.theta_rad(), self.joints.theta_dot_rad_s());
+                self.model.move_to(&self.arm, theta, theta_dot);
+                if !self.joint_friction.is_zero {
                     // It follows the travel between readings, which the prediction does not show.
                     self.model.bias_nm += self.joint_friction.tick(&self.joints.angles_rad);
                 }
@@ -127,7 +121,7 @@ impl Estimators {
             self.force_cell.value(frame.tangential_force.0),
             self.force_cell.value(frame.normal_force.0),
         );
-        let touches = match self.detector.evidence() {
+        let touches = match self.detector.settings.evidence {
             Evidence::ForceCell => self.detector.update_from_force(force_n.y),
             Evidence::Encoders => {
                 let encoders = self.encoder_reading(last);
@@ -191,7 +185,7 @@ impl Estimators {
         );
         let p_per_kg = contact.p_per_kg;
         let slides = p_per_kg > 0.0 && !friction.sticks;
-        if is_informative && slides && !observed.saturated && self.response.is_enabled() {
+        if is_informative && slides && !observed.saturated && self.response.settings.enabled {
             let slope = &model.free_slope_per_kg_m;
             let withheld_n = observed.rounding_nm.vector().dot(slope) / p_per_kg;
             self.response
@@ -273,16 +267,10 @@ impl Estimators {
     fn evaluate(&mut self) {
         // Friction of the joints enters as an unknown torque does.
         let disturbance_nm = self.disturbance.torque_nm - self.joint_friction.torque_nm();
-        let (theta_rad, theta_dot_rad_s) = (self.joints.theta_rad(), self.joints.theta_dot_rad_s());
-        let pose = Pose::new(&theta_rad);
+        let (theta, theta_dot) = (self.joints.theta_rad(), self.joints.theta_dot_rad_s());
+        let pose = Pose::new(&theta);
         self.joints.expect_pose(&pose);
-        self.model = Model::in_pose(
-            &self.arm,
-            &pose,
-            theta_rad,
-            theta_dot_rad_s,
-            &disturbance_nm,
-        );
+        self.model = Model::in_pose(&self.arm, &pose, theta, theta_dot, &disturbance_nm);
         let (model, contact) = (&self.model, &mut self.contact);
         let p_per_kg = model.p_per_kg(contact.friction.coefficient, contact.friction.slip);
         let p_ratio = p_per_kg / model.q22_per_kg;

@@ -131,19 +131,12 @@ impl Model {
         self.jacobian += Matrix2::from_columns(&[across_1, across_2]);
         self.tip_velocity_m_s = self.jacobian * theta_dot_rad_s.vector();
 
-        let squares = |rates: &LinkMotion<f32>| {
-            Vector2::new(
-                rates.first() * rates.first(),
-                rates.second() * rates.second(),
-            )
-        };
+        let squares = |rates: &LinkMotion<f32>| rates.vector().component_mul(rates.vector());
         let now = squares(&theta_dot_rad_s);
         let change = now - squares(&self.theta_dot_rad_s);
-        let j = &self.jacobian;
-        self.centripetal_m_s2 = Vector2::new(
-            -(now.x * j.m21 + now.y * j.m22),
-            now.x * j.m11 + now.y * j.m12,
-        );
+        // Each link's part is at right angles to its column of J.
+        let across = self.jacobian * now;
+        self.centripetal_m_s2 = Vector2::new(-across.y, across.x);
         self.bias_nm += arm.damping_torque_nm(&(theta_dot_rad_s - self.theta_dot_rad_s))
             + GeneralisedTorque::new(
                 -self.centrifugal_nms2 * change.y,

@@ -77,9 +77,9 @@ impl ContactResponse {
 }
 
 /// The estimator: its settings, and the sums over the ticks in contact.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub struct ResponseEstimator {
-    settings: ResponseSettings,
+    pub(super) settings: ResponseSettings,
     tick_s: f32,
     /// Turns over which the averages are taken.
     most_turns: f32,
@@ -182,29 +182,12 @@ impl ResponseEstimator {
             tick_s,
             most_turns: (AVERAGING_S / (Turn::COUNT * tick_s)).at_least(LEAST_TURNS),
             least_share_kg: settings.least_damping_ns_m * tick_s,
-            force_n: 0.0,
-            change_n: 0.0,
-            withheld_n: 0.0,
-            excitation_n: 0.0,
-            acting_probe_n: 0.0,
-            probe_n: 0.0,
             random: 1,
-            expected_n: [0.0; DELAYS + 1],
-            sums: Default::default(),
-            averages: Default::default(),
-            turns: 0.0,
             spread: 1.0,
             width: 1.0,
             gain: if settings.enabled { 0.0 } else { 1.0 },
-            give: 0.0,
-            lags: 0.0,
-            touched_s: 0.0,
+            ..Self::default()
         }
-    }
-
-    /// Returns whether the response is estimated.
-    pub fn is_enabled(&self) -> bool {
-        self.settings.enabled
     }
 
     /// Returns what the response allows where p is `p_per_kg` and `p_ratio` of Q22.
@@ -284,20 +267,12 @@ impl ResponseEstimator {
         if self.turns < LEAST_TURNS {
             return;
         }
-        let [first, second] = &self.averages;
-        let Uncertain {
-            response,
-            deviation,
-        } = first.response(self.spread);
-        self.width = 2.0 * DEVIATIONS * deviation;
-        self.gain = (response - DEVIATIONS * deviation) / RIGID;
-        let upper = response + DEVIATIONS * deviation;
+        let [first, second] = [0, 1].map(|order| self.averages[order].response(self.spread));
+        self.width = 2.0 * DEVIATIONS * first.deviation;
+        self.gain = (first.response - DEVIATIONS * first.deviation) / RIGID;
+        let upper = first.response + DEVIATIONS * first.deviation;
         self.give = (1.0 - upper / (DAMPED * RIGID)).at_least(0.0);
-        let Uncertain {
-            response,
-            deviation,
-        } = second.response(self.spread);
-        let upper = response + DEVIATIONS * deviation;
+        let upper = second.response + DEVIATIONS * second.deviation;
         self.lags = (2.0 - 2.0 * upper / RIGID).limited(0.0, 1.0);
     }
 

@@ -1,7 +1,7 @@
 //! The supervisor's state machine: idle → armed → tracking ⇄ lift-off, and a fault from every
 //! state. A fault is latched until a reset.
 
-use painleve_shared::frame::DigitalInputs;
+use painleve_shared::frame::{ActuatorFrame, DigitalInputs};
 use painleve_shared::status::{Fault, SupervisorState};
 use painleve_shared::{OutOfRange, check_setting, settings};
 
@@ -48,7 +48,7 @@ impl SupervisorSettings {
 }
 
 /// The state machine; initially idle.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub struct Supervisor {
     state: SupervisorState,
     fault: Option<Fault>,
@@ -82,15 +82,10 @@ impl Supervisor {
     /// Makes a supervisor that is called `tick_hz` times a second.
     pub fn new(settings: SupervisorSettings, limits: LapseLimits, tick_hz: f32) -> Self {
         Self {
-            state: SupervisorState::Idle,
-            fault: None,
-            ticks: 0,
-            contact_ticks: 0,
-            lift_offs: 0,
-            inputs: DigitalInputs(0),
             settings,
             tick_hz,
             lapses: LapseMonitor::new(limits),
+            ..Self::default()
         }
     }
 
@@ -103,20 +98,17 @@ impl Supervisor {
         let enabled = inputs.contains(DigitalInputs::ENABLE);
         self.ticks = self.ticks.saturating_add(1);
         match self.state {
-            SupervisorState::Fault => {
-                if rises(DigitalInputs::RESET) {
-                    self.fault = None;
-                    self.enter(SupervisorState::Idle);
-                }
+            SupervisorState::Fault if rises(DigitalInputs::RESET) => {
+                self.fault = None;
+                self.enter(SupervisorState::Idle);
             }
-            SupervisorState::Idle => {
-                // Arm on a rising edge, so that a reset alone does not start the drive again.
-                if rises(DigitalInputs::ENABLE) && has_law {
-                    self.lift_offs = 0;
-                    self.enter(SupervisorState::Armed);
-                    arms = true;
-                }
+            // Arm on a rising edge, so that a reset alone does not start the drive again.
+            SupervisorState::Idle if rises(DigitalInputs::ENABLE) && has_law => {
+                self.lift_offs = 0;
+                self.enter(SupervisorState::Armed);
+                arms = true;
             }
+            SupervisorState::Idle | SupervisorState::Fault => {}
             _ if !enabled => self.enter(SupervisorState::Idle),
             SupervisorState::Armed => {
                 self.contact_ticks = if contact {
@@ -214,6 +206,12 @@ impl Supervisor {
             self.fault = Some(fault);
         }
         self.enter(SupervisorState::Fault);
+    }
+
+    /// Writes state and fault to an answer.
+    pub fn report(&self, answer: &mut ActuatorFrame) {
+        answer.state = self.state as u8;
+        answer.fault = self.fault.map_or(0, |fault| fault as u8);
     }
 
     /// Stops the drive without evaluating the other inputs.

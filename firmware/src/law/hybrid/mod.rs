@@ -92,31 +92,23 @@ impl Law for HybridSettings {
         let normal_force = self.commanded_force_n(state, input);
         let friction_force = self.compensated_friction_n(state, input, normal_force);
         let force_drift = self.force_drift_m_s2(state, input);
-        let acceleration = input
-            .model
-            .link_acceleration_rad_s2(&Vector2::new(tangential_acceleration - force_drift, 0.0));
+        let model = input.model;
+        let along = Vector2::new(tangential_acceleration - force_drift, 0.0);
+        let acceleration = model.link_acceleration_rad_s2(&along);
         let wanted = Vector2::new(friction_force, normal_force);
-        let motion_nm = input.model.inverse_dynamics_in_air_nm(&acceleration);
-        let pressing_nm = input.model.torque_against_nm(&wanted);
-        let Allocation {
-            motion_nm,
-            pressing,
-            slows,
-        } = Allocation::new(
-            input.model,
-            motion_nm,
-            &pressing_nm,
-            input.torque_limit_nm,
-            self.least_pressing,
-        );
-        state.slows = slows;
+        let motion_nm = model.inverse_dynamics_in_air_nm(&acceleration);
+        let pressing_nm = model.torque_against_nm(&wanted);
+        let (limit_nm, least) = (input.torque_limit_nm, self.least_pressing);
+        let given = Allocation::new(model, motion_nm, &pressing_nm, limit_nm, least);
+        state.slows = given.slows;
         // A force that rose at once would make a contact with little damping ring: after landing, and where it
         // followed the torque that the motion leaves.
         let rise = self.pressing_rate_per_s * input.tick_s;
-        state.pressing = pressing.at_most((state.pressing + rise * pressing) / (1.0 + rise));
+        let risen = (state.pressing + rise * given.pressing) / (1.0 + rise);
+        state.pressing = given.pressing.at_most(risen);
         state.fed_force_n = wanted * state.pressing;
         LawOutput {
-            torque_nm: motion_nm + pressing_nm * state.pressing,
+            torque_nm: given.motion_nm + pressing_nm * state.pressing,
             contact_force_n: state.fed_force_n,
         }
     }
