@@ -40,6 +40,7 @@ use at_rest::AtRest;
 pub use margins::Margins;
 pub use options::Options;
 pub use outcome::LoopOutcome;
+use response::Linearised;
 pub use steps::{Curve, Step};
 
 /// Converters that resolve finely, without noise.
@@ -215,10 +216,9 @@ impl LoopMargins {
         let Ok(at_rest) = AtRest::settled(&scenario)? else {
             return Ok(None);
         };
-        let linear = at_rest.linearised(number, response::FAST_S)?;
-        Ok(Some(
-            Margins::of(|hz| linear.open_loop(hz), at_rest.tick_hz()).modulus,
-        ))
+        let linear = at_rest.linearised(number, response::FAST_S)?.ok();
+        let of = |it: Linearised| Margins::of(|hz| it.open_loop(hz), at_rest.tick_hz()).modulus;
+        Ok(linear.map(of))
     }
 
     fn sensitivity(
@@ -278,7 +278,14 @@ impl Study for LoopMargins {
             }
         };
         for number in 0..2 {
-            let linear = at_rest.linearised(number, response::WHOLE_S)?;
+            let linear = match at_rest.linearised(number, response::WHOLE_S)? {
+                Ok(linear) => linear,
+                Err(reason) => {
+                    row.not_held = Some(reason);
+                    row.loops.clear();
+                    return Ok(row);
+                }
+            };
             if linear.is_idle() {
                 continue;
             }

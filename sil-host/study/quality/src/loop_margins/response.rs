@@ -4,9 +4,9 @@ use std::f64::consts::{PI, TAU};
 
 use nalgebra::Complex;
 
-use super::Point;
 use super::at_rest::AtRest;
 use super::margins::{angle, decibels, size, turned};
+use super::{NotHeld, Point};
 use painleve_study_core::StudyError;
 
 /// Duration of the recorded response to a disturbance of one tick, s: the slowest mode of the paper's PID has a time
@@ -17,8 +17,10 @@ pub(super) const FAST_S: f64 = 8.0;
 /// controller's slow work.
 const STARTS: usize = 8;
 /// Size of the disturbance of one tick, in that of a sine: it lasts a thousandth of a second. With a quarter of it, counts blur
-/// the response: near the arm's resonance, where the paper's PID has a gain of 60 dB, it is 14 % off, with this 2 %.
+/// the response: near the arm's resonance, where the paper's PID has a gain of 60 dB, it is 14 % off, with this 2 %. Near the
+/// edge it may lift the tip off, whose flight is no part of the loop: then it is halved, down to the size of a sine.
 const TICK_SIZE: f64 = 32.0;
+const LEAST_TICK_SIZE: f64 = 1.0;
 /// What the response of a stable loop still contains after some ticks is slow: from this tick on it is averaged over this
 /// part of the time since the disturbance, which removes the counts of the encoders.
 const SMOOTH_FROM: usize = 128;
@@ -80,7 +82,8 @@ impl Linearised {
 }
 
 impl AtRest {
-    /// Linearises the loop of a command from its response of this duration, s.
+    /// Linearises the loop of a command from its response of this duration, s; [`NotHeld::LiftOff`] if even a small disturbance
+    /// lifts the tip off.
     ///
     /// # Errors
     /// [`StudyError`] if the plant cannot continue.
@@ -88,9 +91,29 @@ impl AtRest {
         &self,
         number: usize,
         duration_s: f64,
-    ) -> Result<Linearised, StudyError> {
+    ) -> Result<Result<Linearised, NotHeld>, StudyError> {
         let ticks = (duration_s * self.tick_hz()) as usize;
-        let height = TICK_SIZE * self.command(number).size;
+        let mut size = TICK_SIZE;
+        while size >= LEAST_TICK_SIZE {
+            let height = size * self.command(number).size;
+            if let Some(response) = self.response(number, ticks, height)? {
+                return Ok(Ok(Linearised {
+                    response: smoothed(&response),
+                    tick_hz: self.tick_hz(),
+                }));
+            }
+            size *= 0.5;
+        }
+        Ok(Err(NotHeld::LiftOff))
+    }
+
+    /// Returns the command after disturbances of this height, for one of one; `None` if the tip leaves the belt.
+    fn response(
+        &self,
+        number: usize,
+        ticks: usize,
+        height: f64,
+    ) -> Result<Option<Vec<f64>>, StudyError> {
         let mut response = vec![0.0; ticks];
         for start in 0..STARTS {
             let of = |sign: f64| {
@@ -99,15 +122,16 @@ impl AtRest {
                 });
                 recorded.map_err(|source| self.failed(number, source))
             };
-            for (sum, (plus, minus)) in response.iter_mut().zip(of(1.0)?.iter().zip(of(-1.0)?)) {
+            let (plus, minus) = (of(1.0)?, of(-1.0)?);
+            if plus.iter().chain(&minus).any(|it| it.force_n <= 0.0) {
+                return Ok(None);
+            }
+            for (sum, (plus, minus)) in response.iter_mut().zip(plus.iter().zip(&minus)) {
                 let difference = plus.commands[number] - minus.commands[number];
                 *sum += difference / (2.0 * height * STARTS as f64);
             }
         }
-        Ok(Linearised {
-            response: smoothed(&response),
-            tick_hz: self.tick_hz(),
-        })
+        Ok(Some(response))
     }
 
     /// Measures the open loop of a command at frequencies (Hz) with sines.

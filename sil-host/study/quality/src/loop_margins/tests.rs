@@ -97,3 +97,12 @@ fn a_place_beyond_the_edge_is_not_held() {
     assert!(row.not_held.is_some() && row.loops.is_empty());
     assert_eq!(LoopMargins::lines(&row).into_iter().count(), 1);
 }
+
+/// A disturbance of 32 times a sine's size lifts the tip off there: with its flight, the position's loop would seem to cross
+/// over at 427 Hz, 0.3° from instability. Sines cross over near 45 Hz.
+#[test]
+fn near_the_edge_no_flight_passes_for_the_loop() {
+    let row = study("hybrid", &[0.1628], 2).row(0).unwrap();
+    let margins = &row.loops[0].margins;
+    assert!(margins.modulus > 0.15, "{margins:?}");
+}
