@@ -182,6 +182,18 @@ mod tests {
     }
 
     #[test]
+    fn a_kind_without_keys_is_chosen_by_its_name_and_the_same_kind_keeps_its_keys() {
+        let changed = ["effects.friction={ kind = \"step\", at_s = 1.0, change = 0.2 }"];
+        let without = Scenario::load("hybrid-elbow-down", &[]).unwrap();
+        for none in ["effects.friction=none", "effects.friction.kind=none"] {
+            let scenario = load(&[changed[0], none]).unwrap();
+            assert_eq!(scenario.effects.friction, without.effects.friction);
+        }
+        let same = load(&["belt.profile.kind=constant"]).unwrap();
+        assert_eq!(same.belt.profile, without.belt.profile);
+    }
+
+    #[test]
     fn overrides_change_one_key_each() {
         let scenario = load(&[
             "belt.friction=0.4",
@@ -223,7 +235,14 @@ mod tests {
                 "effects.friction=rising",
                 "expected a table with the key 'kind'",
             ),
-            ("effects.friction=step", "missing key 'change'"),
+            (
+                "effects.friction=step",
+                "missing key 'change'; give the variant with all its keys in one { }",
+            ),
+            (
+                "belt.profile.kind=step",
+                "belt.profile: missing key 'from_m_s'",
+            ),
             ("contact=rigid", "expected a table of keys"),
             (
                 "run.tick_hz=fast",

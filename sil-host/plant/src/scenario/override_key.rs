@@ -32,6 +32,12 @@ pub(super) fn with_override(mut scenario: Scenario, text: &str) -> Result<Scenar
     // Message on the first part of the key that is missing, unless an optional setting is absent.
     let mut missing = None;
     let parts: Vec<&str> = key.split('.').collect();
+    let present = parts.iter().try_fold(&root, |place, part| place.get(part));
+    // Another kind has other keys.
+    let parts = match describe::choice_of_tag(&parts) {
+        Some(choice) if present.is_some_and(|kind| *kind != value) => choice,
+        _ => &parts,
+    };
     let mut place = &mut root;
     for (index, part) in parts.iter().copied().enumerate() {
         let variants = describe::untagged_variants(&parts[..index]);
@@ -79,7 +85,7 @@ pub(super) fn with_override(mut scenario: Scenario, text: &str) -> Result<Scenar
     *place = match (&*place, value) {
         // An integer is accepted as a number.
         (Value::Float(_), Value::Integer(integer)) => Value::Float(integer as f64),
-        (_, Value::String(name)) => describe::chosen(&parts, name),
+        (_, Value::String(name)) => describe::chosen(parts, name),
         (_, value) => value,
     };
     let Value::Table(table) = root else {

@@ -60,7 +60,8 @@ pub(super) fn in_words(message: &str, setting: Option<&Field>) -> String {
         }
     }
     if let Some(key) = after("missing field ") {
-        return format!("missing key {key}");
+        // Only keys of variants have no defaults.
+        return format!("missing key {key}; give the variant with all its keys in one {{ }}");
     }
     if message.starts_with("data did not match any variant") {
         return "matches none of its kinds".into();
@@ -161,7 +162,10 @@ mod tests {
                 "unknown field `x`, expected `one` or `two`",
                 "unknown key 'x'; known: one, two",
             ),
-            ("missing field `change`", "missing key 'change'"),
+            (
+                "missing field `change`",
+                "missing key 'change'; give the variant with all its keys in one { }",
+            ),
             (
                 "invalid type: string \"abc, expected f64\", expected f64",
                 "expected a number, not \"abc, expected f64\"",

@@ -13,7 +13,7 @@ mod schema;
 
 use std::f64::consts::PI;
 
-use painleve_shared::settings::{Field, Range, Settings, Shape, Variant};
+use painleve_shared::settings::{Field, Range, Settings, Shape};
 use serde::ser::Error;
 use toml::{Table, Value};
 
@@ -153,26 +153,31 @@ pub(super) fn untagged_variants(path: &[&str]) -> Vec<&'static str> {
         .collect()
 }
 
-/// Returns the value of the setting at `path` if its text is the name of a variant with settings: that
-/// variant with their defaults. Any other text is the value itself.
+/// Returns the value of the setting at `path` if its text is the name of a variant that is a table: that variant with the
+/// defaults of its settings. Any other text is the value itself.
 pub(super) fn chosen(path: &[&str], text: String) -> Value {
-    let has_settings = |variants: &[Variant]| {
-        let named = variants.iter().find(|variant| variant.key == text);
-        named.is_some_and(|variant| variant.content.is_some())
-    };
     for shape in shapes(path) {
-        match shape.resolved() {
-            Shape::Choice { tag, variants } if has_settings(variants) => {
-                let table = match tag {
-                    Some(tag) => Table::from_iter([(tag.into(), Value::String(text))]),
-                    None => Table::from_iter([(text, Value::Table(Table::new()))]),
-                };
-                return Value::Table(table);
-            }
-            _ => {}
-        }
+        let Shape::Choice { tag, variants } = shape.resolved() else {
+            continue;
+        };
+        let Some(variant) = variants.iter().find(|variant| variant.key == text) else {
+            continue;
+        };
+        let table = match tag {
+            Some(tag) => Table::from_iter([(tag.into(), Value::String(text))]),
+            None if variant.content.is_none() => continue,
+            None => Table::from_iter([(text, Value::Table(Table::new()))]),
+        };
+        return Value::Table(table);
     }
     Value::String(text)
+}
+
+/// Returns the path of the choice whose tag is the setting at `path`: naming a kind chooses all of it.
+pub(super) fn choice_of_tag<'a>(path: &'a [&'a str]) -> Option<&'a [&'a str]> {
+    let (last, choice) = path.split_last()?;
+    let is_tag = |shape: &Shape| matches!(shape.resolved(), Shape::Choice { tag: Some(tag), .. } if tag == *last);
+    shapes(choice).iter().any(is_tag).then_some(choice)
 }
 
 /// Returns the setting at `path`, which may be an item of one, unless several variants of a choice have one there.
