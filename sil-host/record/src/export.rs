@@ -16,7 +16,7 @@ use crate::record_file::{Damage, Extent, RecordedMessage, messages};
 #[derive(Debug, thiserror::Error)]
 pub enum ExportError {
     /// The record is damaged, and nothing is exported.
-    #[error("not a complete MCAP file: {0}")]
+    #[error("not a complete MCAP file, of which no tick is whole: {0}")]
     Incomplete(#[from] Damage),
     /// The record is damaged behind whole ticks.
     #[error(
