@@ -189,13 +189,15 @@ pub enum Mistake {
     },
     /// The model presses harder than the force cell measures.
     #[error(
-        "arm: by the scenario its weight presses on the belt below joint 1 with {expected_n:.1} N, more than the force cell measures (converters.force.range_n = {range_n}); check link_mass_kg and the springs, or take another cell"
+        "arm: by the scenario its weight presses on the belt below joint 1 with {expected_n:.1} N, more than the force cell measures (converters.force.range_n = {range_n}, of which the codes in converters.mounting leave {most_n:.1} N); check link_mass_kg and the springs, or take another cell"
     )]
     TooHeavy {
         /// Force expected from the weight, N.
         expected_n: f64,
         /// Range of the force cell, N.
         range_n: f64,
+        /// Largest force that it measures, N.
+        most_n: f64,
     },
     /// The tip is not at the requested position.
     #[error(
@@ -220,6 +222,17 @@ pub enum Mistake {
     StageDead {
         /// Index of the joint.
         joint: usize,
+    },
+    /// No measurable torque leaves the force within the cell's range.
+    #[error(
+        "torque stage of {}: under a small torque of either sign the force cell is at its limit (converters.force.range_n = {range_n}); check the stage, and that the cell measures more than the arm's weight",
+        JOINT_NAMES[*.joint]
+    )]
+    StageAtForceLimit {
+        /// Index of the joint.
+        joint: usize,
+        /// Range of the force cell, N.
+        range_n: f64,
     },
     /// The torque stages are exchanged.
     #[error("torque stages: exchanged with each other; swap their inputs (PA4, PA5)")]

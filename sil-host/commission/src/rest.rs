@@ -4,6 +4,7 @@
 //! At rest, 0 = −w + Jᵀ f + u (paper, eq. 1 without motion), whether the tip sticks or is about to slide.
 
 use nalgebra::Vector2;
+use painleve_plant::decimal::as_written;
 use painleve_shared::counts::ForceCounts;
 use painleve_shared::kinematics::Pose;
 use painleve_shared::{Arm, JointTorque, LinkMotion};
@@ -35,8 +36,12 @@ const RATIO: core::ops::Range<f64> = 0.5..2.0;
 /// Reading below which the cell has not noticed the weight, as a part of the expected force.
 const DEAD: f64 = 0.2;
 
-/// Reading that counts as the force cell's limit, as a part of its range.
+/// Reading that counts as the force cell's limit, as a part of the last that a working cell gives: its noise, and the rise of
+/// a torque in some ticks, beyond which there would be no reading.
 const LIMIT: f64 = 0.99;
+
+/// Code of a force cell's live zero, which is half of its converter's codes: see the codes in `converters.mounting`.
+const LIVE_ZERO: u16 = 2048;
 
 /// The arm at rest.
 #[derive(Clone, Debug)]
@@ -79,20 +84,38 @@ pub(crate) fn check(expected: &Expected) -> Result<(), Mistake> {
 /// Returns the force (N) with which the arm's weight should press on the belt at these angles (rad), if the force cell can
 /// measure it.
 fn weight_n(expected: &Expected, theta_rad: Option<LinkMotion<f64>>) -> Result<f64, Mistake> {
-    let range_n = f64::from(expected.converters.force.range);
+    let range_n = as_written(expected.converters.force.range);
     let force_n =
         theta_rad.and_then(|it| force_at_rest_n(&expected.arm, &it, JointTorque::zeros()));
     let expected_n = force_n.map_or(0.0, |it| it.y);
     if expected_n < LEAST_N.max(LEAST_SHARE * range_n) {
         return Err(Mistake::TooLight { expected_n });
     }
-    if expected_n > LIMIT * range_n {
+    let most_n = limit_share(expected) * range_n;
+    if expected_n > most_n {
         return Err(Mistake::TooHeavy {
             expected_n,
             range_n,
+            most_n,
         });
     }
     Ok(expected_n)
+}
+
+/// Returns the reading that counts as the force cell's limit, as a part of its range: a board takes codes beyond those of a
+/// working cell for none.
+fn limit_share(expected: &Expected) -> f64 {
+    let mounting = &expected.converters.mounting;
+    let above = mounting.force_highest_code.saturating_sub(LIVE_ZERO);
+    let below = LIVE_ZERO.saturating_sub(mounting.force_lowest_code);
+    LIMIT * f64::from(above.min(below)) / f64::from(LIVE_ZERO)
+}
+
+/// Returns whether the force cell reads its limit on either axis, so that the force may be larger.
+pub(crate) fn is_at_limit(expected: &Expected, force_counts: [f64; 2]) -> bool {
+    let most = f64::from(expected.converters.force.maximum_counts());
+    let limit_counts = limit_share(expected) * most;
+    force_counts.iter().any(|it| it.abs() > limit_counts)
 }
 
 /// Measures height and weight.
@@ -131,8 +154,7 @@ pub(crate) fn measure<R: Rig>(
     }
     let net_n = session.net_force_n(readings.forces, encoders.tare);
     let expected_n = weight_n(expected, Some(theta_rad))?;
-    let most = f64::from(expected.converters.force.maximum_counts());
-    if readings.forces.iter().any(|it| it.abs() > LIMIT * most) {
+    if is_at_limit(expected, readings.forces) {
         return Err(Mistake::ForceLimit { expected_n }.into());
     }
     let ratio = net_n.y.abs() / expected_n;

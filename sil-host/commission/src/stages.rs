@@ -3,13 +3,17 @@
 //!
 //! The tip stays where it is, so that f changes by −J⁻ᵀ B Δu, where B converts joint torques to those on the
 //! links: the first joint's torque acts along link 2, the elbow's along the line from joint 1 to the tip.
+//!
+//! Of an arm whose weight nearly fills the range of the force cell, only the torque that relieves the tip is measured, against
+//! the arm at rest: at its limit, the cell reads less than the force.
 
 use nalgebra::{Matrix2, Vector2};
+use painleve_plant::decimal::as_written;
 use painleve_shared::kinematics::Pose;
 use painleve_shared::{JointTorque, LinkMotion};
 
 use crate::readings::Session;
-use crate::rest::{RestFound, force_at_rest_n};
+use crate::rest::{RestFound, force_at_rest_n, is_at_limit};
 use crate::{CommissionError, Deviation, Mistake, OperatorTask, Rig};
 
 /// Change of the contact force, as a part of f_n at rest.
@@ -59,13 +63,8 @@ pub(crate) fn measure<R: Rig>(
         if change_n < LEAST_COUNTS * f64::from(session.expected.converters.force.per_count()) {
             return Err(Mistake::TorqueTooSmall { joint, change_n }.into());
         }
-        let [plus, minus] = [1.0, -1.0].map(|sign| {
-            let mut torques = [0.0; 2];
-            torques[joint] = sign * torque_nm;
-            force_under(session, rest, JointTorque::from_array(torques))
-        });
-        let change = (plus? - minus?) / (2.0 * torque_nm);
-        measured.set_column(joint, &change);
+        let changed_n = force_change_n(session, rest, joint, torque_nm)?;
+        measured.set_column(joint, &(changed_n / torque_nm));
     }
     let explained = explain(&model, &measured)?;
     let mounting = &session.expected.converters.mounting;
@@ -113,23 +112,62 @@ fn effects<R: Rig>(
     }
 }
 
+/// Returns the change of the force (f_t, f_n), N, by a torque on one joint: half of that between both signs, or that from rest
+/// under the sign that leaves the force within the cell's range.
+fn force_change_n<R: Rig>(
+    session: &mut Session<'_, R>,
+    rest: &RestFound,
+    joint: usize,
+    torque_nm: f64,
+) -> Result<Vector2<f64>, CommissionError<R::Error>> {
+    let mut under = |torque_nm: f64| {
+        let mut torques = [0.0; 2];
+        torques[joint] = torque_nm;
+        force_under(session, rest, JointTorque::from_array(torques))
+    };
+    let (plus, minus) = (under(torque_nm)?, under(-torque_nm)?);
+    if let (Some(plus), Some(minus)) = (plus, minus) {
+        return Ok((plus - minus) / 2.0);
+    }
+    match (plus, under(0.0)?, minus) {
+        (Some(plus), Some(resting), _) => Ok(plus - resting),
+        (_, Some(resting), Some(minus)) => Ok(resting - minus),
+        _ => Err(Mistake::StageAtForceLimit {
+            joint,
+            range_n: as_written(session.expected.converters.force.range),
+        }
+        .into()),
+    }
+}
+
 /// Returns the force (f_t, f_n), N, under torques that rise gradually and fall again; f_t in the cell's direction,
-/// f_n positive away from the belt.
+/// f_n positive away from the belt. `None` if it takes the cell to its limit.
 fn force_under<R: Rig>(
     session: &mut Session<'_, R>,
     rest: &RestFound,
     torque_nm: JointTorque<f64>,
-) -> Result<Vector2<f64>, CommissionError<R::Error>> {
+) -> Result<Option<Vector2<f64>>, CommissionError<R::Error>> {
     let ticks = session.ticks(RISE_S);
-    for tick in 0..ticks {
-        let part = f64::from(tick) / f64::from(ticks);
-        session.exchange(torque_nm * part)?;
+    let part = |tick: u32| f64::from(tick) / f64::from(ticks);
+    let (mut risen, mut is_beyond) = (0, false);
+    while risen < ticks && !is_beyond {
+        let forces = session.exchange(torque_nm * part(risen))?.forces;
+        let scale = &session.expected.converters.force;
+        let is_read = forces.iter().all(|it| scale.contains(it.0));
+        is_beyond = is_read && is_at_limit(session.expected, forces.map(|it| it.0.into()));
+        risen += 1;
     }
-    let readings = session.mean(torque_nm)?;
-    for tick in 0..ticks {
-        let part = 1.0 - f64::from(tick) / f64::from(ticks);
-        session.exchange(torque_nm * part)?;
+    let readings = if is_beyond {
+        None
+    } else {
+        Some(session.mean(torque_nm)?)
+    };
+    for tick in (0..risen).rev() {
+        session.exchange(torque_nm * part(tick))?;
     }
+    let Some(readings) = readings else {
+        return Ok(None);
+    };
     let moved_m = session.theta_rad(readings.joints).map_or(0.0, |theta| {
         let arm = &session.expected.arm;
         let tip = |theta| arm.tip_m(&Pose::new(theta));
@@ -141,11 +179,14 @@ fn force_under<R: Rig>(
         }
         .into());
     }
+    if is_at_limit(session.expected, readings.forces) {
+        return Ok(None);
+    }
     let mut net_n = session.net_force_n(readings.forces, rest.tare);
     if rest.normal_reversed {
         net_n.y = -net_n.y;
     }
-    Ok(net_n)
+    Ok(Some(net_n))
 }
 
 /// How the measured effects follow from those of the model.

@@ -122,6 +122,40 @@ fn every_built_in_mistake_is_found_and_named() {
     }
 }
 
+/// With its elbow up, the arm rests with 17.4 N on a force cell of 20 N: pressing harder takes the cell to its limit.
+#[test]
+fn every_mistake_is_found_in_an_arm_whose_weight_nearly_fills_the_force_cell() {
+    let scenario = Scenario::load("hybrid-elbow-up", &[]).unwrap();
+    for mistake in BuiltInMistake::ALL {
+        for seed in 1..4 {
+            assert_eq!(is_named(&scenario, *mistake, seed), Ok(()));
+        }
+    }
+}
+
+#[test]
+fn a_healthy_arm_is_refused_for_no_more_than_the_range_of_its_force_cell() {
+    let mut passed = 0;
+    // By its model, the arm rests with 17.4 N, and by a board's readings no working cell gives more than 96 % of its range.
+    for range_n in (0..30).map(|step| 17.0 + 0.1 * f64::from(step)) {
+        let range = format!("converters.force.range_n={range_n}");
+        let scenario = Scenario::load("hybrid-elbow-up", &[range]).unwrap();
+        for seed in 1..5 {
+            match commissioned(&scenario, None, seed) {
+                Ok(commissioned) => {
+                    assert_eq!(commissioned.deviations, [], "{range_n} N, seed {seed}");
+                    passed += 1;
+                }
+                Err(refusal) => assert!(
+                    refusal.contains("converters.force.range_n"),
+                    "{range_n} N, seed {seed}: {refusal}"
+                ),
+            }
+        }
+    }
+    assert!(passed >= 40, "{passed}");
+}
+
 #[test]
 #[ignore = "a campaign"]
 fn every_mistake_is_found_in_random_arms() {
