@@ -258,6 +258,8 @@ fn options_without_effect_are_refused() {
             "scenarios --schema --diff",
             "--diff has no effect without SCENARIO",
         ),
+        // No board reads its sensors at 10 kHz.
+        ("identify paper-gains --rehearse", "run.tick_hz = 10000"),
         ("scenarios --schema --set belt.friction=0.4", "--set"),
         (
             "scenarios --keys frictoin",

@@ -183,8 +183,9 @@ fn found(
         };
         return Ok((found, source));
     }
+    // A rehearsal shows what the board would refuse.
+    check_rate(scenario)?;
     if let Some(port) = &arguments.port {
-        check_rate(scenario)?;
         check_not_rehearsed(scenario)?;
         check_overrides(scenario, &arguments.overrides)?;
         if is_new(scenario) {
