@@ -184,6 +184,11 @@ pub enum InputError {
         "this scenario has never been commissioned: if a sensor or a stage is mounted in the other direction, the feedback is positive; measure the arm with painleve commission first"
     )]
     NotCommissioned,
+    /// Second sensors of an arm whose scenario says that it has none.
+    #[error(
+        "--second-sensors: the scenario says that the arm has none (converters.mounting.sensors = first): if it has two on each channel, set that to both; otherwise, leave the option out"
+    )]
+    NoSecondSensors,
     /// `--live` together with another host.
     #[error("--live runs the controller in this process: leave out --host")]
     LiveHost,

@@ -252,14 +252,18 @@ fn options_without_effect_are_refused() {
             "commission edge --port x --seed 4",
             "--seed has no effect without --rehearse",
         ),
+        (
+            "commission edge --rehearse --second-sensors --set converters.mounting.sensors=first",
+            "converters.mounting.sensors = first",
+        ),
         ("identify edge --port x --mistake bent-link", "--mistake"),
         ("identify --slide elbow-up=r.mcap --seed 3", "--seed"),
+        // No board reads its sensors at 10 kHz.
+        ("identify paper-gains --rehearse", "run.tick_hz = 10000"),
         (
             "scenarios --schema --diff",
             "--diff has no effect without SCENARIO",
         ),
-        // No board reads its sensors at 10 kHz.
-        ("identify paper-gains --rehearse", "run.tick_hz = 10000"),
         ("scenarios --schema --set belt.friction=0.4", "--set"),
         (
             "scenarios --keys frictoin",

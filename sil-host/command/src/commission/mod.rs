@@ -94,6 +94,10 @@ pub fn run(arguments: &CommissionArguments) -> Result<(), CommandError> {
         arguments.seed,
     )?;
     let mut scenario = Scenario::load(&arguments.scenario, &arguments.overrides)?;
+    let sensors = scenario.converters.mounting.sensors;
+    if arguments.second_sensors && sensors == SensorParts::First {
+        return Err(InputError::NoSecondSensors.into());
+    }
     let tick_hz = scenario.run.tick_hz;
     check_rate(&scenario)?;
     if arguments.port.is_some() {
