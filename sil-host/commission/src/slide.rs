@@ -38,11 +38,16 @@ const MEAN_S: f64 = 0.01;
 const PAUSE_S: f64 = 0.1;
 
 /// Why the friction has not been measured.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum NoSlide {
     /// More torque would be needed.
-    #[error("the tip did not slide within --torque-limit-nm")]
-    TorqueLimit,
+    #[error(
+        "the tip did not slide within a torque of {limit_nm} N·m; raise --torque-limit-nm, or set belt.friction"
+    )]
+    TorqueLimit {
+        /// The torque limit, N·m.
+        limit_nm: f64,
+    },
     /// The tip holds however much it is pushed.
     #[error(
         "the tip did not slide under a tangential force of {LARGEST_RATIO} times the normal force"
@@ -59,7 +64,8 @@ pub(crate) fn measure<R: Rig>(
     rest: &RestFound,
     force_reversed: [bool; 2],
 ) -> Result<Result<f64, NoSlide>, CommissionError<R::Error>> {
-    let mut ratios = [Err(NoSlide::TorqueLimit); 2];
+    let limit_nm = session.expected.torque_limit_nm;
+    let mut ratios = [Err(NoSlide::TorqueLimit { limit_nm }); 2];
     for (ratio, direction) in ratios.iter_mut().zip([1.0, -1.0]) {
         *ratio = slide(session, rest, force_reversed, direction)?;
         for _ in 0..session.ticks(PAUSE_S) {
@@ -97,7 +103,7 @@ fn slide<R: Rig>(
         .rev()
         .max_by_key(|share| reach(*share))
     else {
-        return Ok(Err(NoSlide::TorqueLimit));
+        return Ok(Err(NoSlide::TorqueLimit { limit_nm }));
     };
     let mut theta = rest.theta_rad;
     let mut start_m = None;
@@ -108,7 +114,7 @@ fn slide<R: Rig>(
         let ratio = f64::from(tick) * step;
         let torque_nm = torque_for(session, &theta, &force_n(share, ratio));
         if torque_nm.amax() > limit_nm {
-            return Ok(Err(NoSlide::TorqueLimit));
+            return Ok(Err(NoSlide::TorqueLimit { limit_nm }));
         }
         let part = (f64::from(tick) / f64::from(session.ticks(RELIEF_S))).min(1.0);
         let raw = session.exchange(torque_nm * part)?;

@@ -422,7 +422,12 @@ fn a_friction_too_large_to_be_measured_is_told_from_a_torque_limit() {
         let mut rig = SimulatedRig::new(&scenario, None, 2);
         commission(&mut rig, &expected).unwrap().friction
     };
-    assert_eq!(friction(0.9, 0.2), Err(NoSlide::TorqueLimit));
+    let limited = friction(0.9, 0.2).unwrap_err();
+    assert_eq!(limited, NoSlide::TorqueLimit { limit_nm: 0.2 });
+    assert_eq!(
+        limited.to_string(),
+        "the tip did not slide within a torque of 0.2 N·m; raise --torque-limit-nm, or set belt.friction"
+    );
     assert_eq!(friction(1.9, 5.0), Err(NoSlide::Holds));
 }
 
