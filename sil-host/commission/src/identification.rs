@@ -62,6 +62,10 @@ const LANDING_M_S: f32 = 0.005;
 /// Speed of the belt in a slide, m/s. Waves and seam shake a tip with the square of the speed.
 const BELT_M_S: f64 = 0.15;
 
+/// Speed of a tip along the belt, in its direction, from which the belt carries it, m/s: between that of a slide and that of
+/// its belt.
+const CARRIED_M_S: f64 = (SPEED_M_S + BELT_M_S) / 2.0;
+
 /// Multiple of the ripple's root mean square that the wanted normal force must exceed in use.
 const RIPPLES: f64 = 8.0;
 
@@ -210,6 +214,7 @@ pub fn limits(scenario: &Scenario) -> Limits {
         .map_or(0.0, |arm| f64::from(arm.reach_on_belt_m()));
     let least = Limits::default();
     Limits {
+        torque_limit_nm: as_written(scenario.controller.torque_limit_nm),
         count_rad: core::f64::consts::TAU / counts,
         contact_n: CONTACT_N,
         tip_deviation_m: least.tip_deviation_m.max(DEVIATION_OF_REACH * reach_m),
@@ -316,7 +321,9 @@ fn attempt<R: SlideRig>(
         let belt_m_s = program.belt.profile.speed_m_s(0.0);
         check_friction(index, &slide, belt_m_s, limits).err()
     };
-    let refusal = if let Some(surprise) = surprise {
+    let refusal = if let Err(limited) = slide.check_torque(index, limits) {
+        Some(limited)
+    } else if let Some(surprise) = surprise {
         // A tip that was thrown at once shows no friction.
         let slid_s = slide.on_belt(limits).count() as f64 / f64::from(program.run.tick_hz);
         let has_slid = slid_s >= MEAN_S;
@@ -414,7 +421,7 @@ pub struct Found {
     /// Acceleration of the tip off the belt by what the controller does not know, root mean square, m/s²: the ripple of the
     /// normal force times p. Zero without a reading on the belt.
     pub ripple_m_s2: f64,
-    /// Friction coefficient of the tip on the belt.
+    /// Friction coefficient of the tip on the belt; not a number if the belt has carried the tip all the time.
     pub friction: f64,
     /// The same by the scenario.
     pub told_friction: f64,
@@ -437,11 +444,12 @@ impl Found {
         let tick_hz = f64::from(scenario.run.tick_hz);
         let joints = Joints::of(slides, geometry, &known, tick_hz, &limits)?;
         joints.check()?;
+        let arm = Arm::new(known)?;
         Ok(Self {
             joints,
-            friction: friction(slides, &limits),
+            friction: friction(slides, geometry, &arm, tick_hz, &limits),
             told_friction: scenario.belt.friction,
-            ripple_m_s2: ripple_m_s2(slides, geometry, &Arm::new(known)?, tick_hz, &limits),
+            ripple_m_s2: ripple_m_s2(slides, geometry, &arm, tick_hz, &limits),
             identified,
             prior,
         })
@@ -511,16 +519,50 @@ impl Found {
     }
 }
 
-/// Returns the friction coefficient of slides: the sum of |f_t| over that of f_n.
-fn friction(slides: &[Slide], limits: &Limits) -> f64 {
+/// Returns the friction coefficient of slides: the sum of |f_t| over that of f_n, as long as the belt does not carry the tip.
+fn friction(
+    slides: &[Slide],
+    geometry: &Parameters,
+    arm: &Arm<f64>,
+    tick_hz: f64,
+    limits: &Limits,
+) -> f64 {
+    let tip_t_m = |reading: &Reading| arm.tip_m(&pose(geometry, reading)).x;
+    let ticks = (MEAN_S * tick_hz).max(1.0) as u32;
     let mut sums_n = [0.0; 2];
-    for reading in slides.iter().flat_map(|slide| slide.on_belt(limits)) {
-        for (sum_n, force_n) in sums_n.iter_mut().zip(reading.force_n) {
-            *sum_n += force_n.abs();
+    for slide in slides {
+        let touching: Vec<&Reading> = slide.on_belt(limits).collect();
+        let Some(first) = touching.first() else {
+            continue;
+        };
+        let time = |reading: &Reading| reading.tick.wrapping_sub(first.tick) / ticks;
+        for of_time in touching.chunk_by(|one, other| time(one) == time(other)) {
+            let [from, .., to] = of_time else {
+                continue;
+            };
+            let time_s = f64::from(to.tick.wrapping_sub(from.tick)) / tick_hz;
+            let speed_m_s = (tip_t_m(to) - tip_t_m(from)) / time_s;
+            let along_n: f64 = of_time.iter().map(|it| it.force_n[0]).sum();
+            // Friction pushes the tip as the belt runs.
+            if speed_m_s * along_n.signum() > CARRIED_M_S {
+                continue;
+            }
+            for reading in of_time {
+                for (sum_n, force_n) in sums_n.iter_mut().zip(reading.force_n) {
+                    *sum_n += force_n.abs();
+                }
+            }
         }
     }
     let [tangential_n, normal_n] = sums_n;
     tangential_n / normal_n
+}
+
+/// Returns the pose of a reading.
+fn pose(geometry: &Parameters, reading: &Reading) -> Pose<f64> {
+    let [first, elbow] =
+        [0, 1].map(|joint| joint_rad(geometry, joint, reading.encoders_rad[joint]));
+    Pose::new(&LinkMotion::new(first, first + elbow))
 }
 
 /// Returns the ripple of [`Found::ripple_m_s2`].
@@ -551,10 +593,7 @@ fn ripple_m_s2(
             let share = (since(before, reading) / mean_ticks).min(1.0);
             before = reading.tick;
             mean_n += share * (normal_n - mean_n);
-            let [first, elbow] =
-                [0, 1].map(|joint| joint_rad(geometry, joint, reading.encoders_rad[joint]));
-            let q =
-                arm.inverse_tip_inertia_per_kg(&Pose::new(&LinkMotion::new(first, first + elbow)));
+            let q = arm.inverse_tip_inertia_per_kg(&pose(geometry, reading));
             let p = q.m22 + q.m12 * tangential_n / normal_n;
             let off_m_s2 = p * (normal_n - mean_n);
             sum += off_m_s2 * off_m_s2;
@@ -612,6 +651,44 @@ mod tests {
             (sparse / rippling - 1.0).abs() < 0.05,
             "{sparse} {rippling}"
         );
+    }
+
+    #[test]
+    fn a_tip_that_its_belt_carries_shows_no_friction() {
+        let scenario = Scenario::default();
+        let geometry = prior(&scenario, &Drawn::default()).parameters;
+        let arm = Arm::new(scenario.arm).unwrap();
+        let reading = |tick: u32, tip_t_m: f64, along_n: f64| {
+            let theta = arm.link_angles_on_belt_rad(tip_t_m, Posture::ElbowUp);
+            Reading {
+                tick,
+                encoders_rad: theta.unwrap().to_joints().to_array(),
+                force_n: [along_n, 4.0],
+                torque_nm: [0.0; 2],
+            }
+        };
+        let friction = |belt: f64, is_slid: bool| {
+            let slid = (0..1000).map(|tick| {
+                let tip_t_m = -0.06 * belt * f64::from(tick) * 1e-3;
+                reading(tick, tip_t_m, 2.4 * belt)
+            });
+            let carried = (1000..2000).map(|tick| {
+                let tip_t_m = BELT_M_S * belt * f64::from(tick - 1000) * 1e-3;
+                reading(tick, tip_t_m, 0.8 * belt)
+            });
+            let slide = Slide {
+                posture: Posture::ElbowUp,
+                readings: slid.filter(|_| is_slid).chain(carried).collect(),
+                missing: 0,
+                whole: 2000,
+            };
+            super::friction(&[slide], &geometry, &arm, 1000.0, &limits(&scenario))
+        };
+        for belt in [1.0, -1.0] {
+            let friction_of_slid = friction(belt, true);
+            assert!((friction_of_slid - 0.6).abs() < 1e-9, "{friction_of_slid}");
+            assert!(friction(belt, false).is_nan());
+        }
     }
 
     #[test]

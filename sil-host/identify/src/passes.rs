@@ -159,6 +159,7 @@ impl Points {
                 percent: 100.0 * missing,
             });
         }
+        of.check_torque(slide, limits)?;
         of.check_on_belt(slide, limits)?;
         let touching: Vec<_> = of.on_belt(limits).collect();
         let tip_t_m = |encoders_rad| Place::at(parameters, encoders_rad).tip_t_m;

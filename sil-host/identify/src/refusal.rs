@@ -120,6 +120,19 @@ pub enum Refusal {
         /// Share of ticks, %.
         percent: f64,
     },
+    /// The torque did not suffice.
+    #[error(
+        "slide {}: a torque was at its limit (controller.torque_limit_nm = {limit_nm}) in {percent:.0} % of the readings, so that the tip did not slide as it should; raise it to what the stages surely give",
+        .slide + 1
+    )]
+    TorqueLimit {
+        /// Index of the slide.
+        slide: usize,
+        /// Share of the readings with a torque at its limit, %.
+        percent: f64,
+        /// The limit, N·m.
+        limit_nm: f64,
+    },
     /// The tip was in the air.
     #[error(
         "slide {}: the tip was on the belt in {percent:.0} % of the readings only (f_n of {contact_n} N or more); press it down, and check the force cell and controller.torque_limit_nm",

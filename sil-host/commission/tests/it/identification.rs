@@ -235,6 +235,22 @@ fn a_tip_rests_on_its_belt_before_it_slides() {
         let slide = slide_scenario(&scenario, 0.2, posture, 4.0).unwrap();
         assert!(rig.slide(index, &slide, posture).unwrap().is_complete);
     }
+/// Simulated arms with the elbow up take more than 1.2 N·m.
+#[test]
+fn a_torque_limit_that_is_too_low_is_named_before_all_that_follows_from_it() {
+    for (limit_nm, seed) in [(0.4, 3), (0.5, 1), (0.6, 2), (0.7, 1), (0.8, 3), (0.9, 2)] {
+        let limit = format!("controller.torque_limit_nm={limit_nm}");
+        let scenario = Scenario::default()
+            .with_overrides("weak", &[limit])
+            .unwrap();
+        let (found, _) = identified(&scenario, seed, None);
+        let refusal = found.map(|_| ()).unwrap_err();
+        let expected =
+            format!("a torque was at its limit (controller.torque_limit_nm = {limit_nm})");
+        assert!(refusal.contains(&expected), "{limit_nm}, {seed}: {refusal}");
+    }
+}
+
     assert!(rig.largest_force_n < 7.0, "{}", rig.largest_force_n);
 }
 
