@@ -155,8 +155,8 @@ pub struct Joints {
     pub cells: [Cell; 2],
     /// Tilt of the belt beyond that of the model, rad.
     pub tilt_rad: Estimate,
-    /// Torque that the model leaves over, root mean square, N·m: with the friction known before, and with this result. `None` if
-    /// no joint has turned enough.
+    /// Torque that the model leaves over, root mean square, N·m: with all but the geometry as known before, and with this
+    /// result. `None` if no joint has turned enough.
     pub left_over_nm: Option<[f64; 2]>,
     /// Torque of the slides, root mean square, N·m.
     pub torque_nm: f64,

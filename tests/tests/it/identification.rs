@@ -53,6 +53,7 @@ fn a_rehearsal_writes_what_it_has_found() {
         "Identification: hybrid-elbow-down",
         "friction",
         "The arm's model explains",
+        "with all but the geometry as in the scenario",
         "Set the tip down here",
     ] {
         assert!(page.contains(part), "{part}: {page}");

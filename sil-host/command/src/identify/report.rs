@@ -112,7 +112,7 @@ fn sentences(found: &Found) -> Vec<String> {
     let [off_before_m, off_after_m] = identified.off_line_m;
     let of_torques = match found.joints.left_over_nm {
         Some([before_nm, after_nm]) => format!(
-            "The arm's model explains the torques to {:.0} mN·m (with the friction and springs known before: {:.0} mN·m).",
+            "The arm's model explains the torques to {:.0} mN·m (with all but the geometry as in the scenario: {:.0} mN·m).",
             1e3 * after_nm,
             1e3 * before_nm
         ),
