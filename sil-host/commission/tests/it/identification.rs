@@ -171,6 +171,31 @@ fn arms_as_bad_as_life_are_identified() {
 }
 
 #[test]
+#[ignore = "a campaign"]
+fn the_belts_tilt_is_as_far_off_as_its_deviation_says() {
+    let own = Scenario::load("../../examples/own-arm.toml", &[]).unwrap();
+    for scenario in [own, Scenario::default()] {
+        let [mut error_square, mut off_square] = [0.0; 2];
+        for seed in 1..=16 {
+            let actual = imperfect(&scenario, seed).unwrap();
+            let error_rad = scenario.arm.belt_tilt_rad - actual.arm.belt_tilt_rad;
+            let mut rig = SimulatedSlides::new(actual, None);
+            let found = identify_arm(&mut rig, &scenario, &drawn()).unwrap();
+            let tilt = found.joints.tilt_rad;
+            let error_rad = error_rad + tilt.value;
+            error_square += error_rad.powi(2) / 16.0;
+            off_square += (error_rad / tilt.deviation).powi(2) / 16.0;
+        }
+        let [error_rad, off] = [error_square, off_square].map(f64::sqrt);
+        println!(
+            "{}: {error_rad:.4} rad off, {off:.2} deviations, root mean square",
+            scenario.name
+        );
+        assert!(off < 1.2, "{}: {off}", scenario.name);
+    }
+}
+
+#[test]
 fn a_value_that_is_not_taken_or_that_no_controller_takes_leaves_what_was_known() {
     let scenario = Scenario::default();
     let (found, _) = identified(&scenario, 51_000, None);
@@ -210,6 +235,22 @@ fn a_value_that_is_not_taken_or_that_no_controller_takes_leaves_what_was_known()
     assert!(refusal.starts_with(expected), "{refusal}");
 }
 
+/// Simulated arms with the elbow up take more than 1.2 N·m.
+#[test]
+fn a_torque_limit_that_is_too_low_is_named_before_all_that_follows_from_it() {
+    for (limit_nm, seed) in [(0.4, 3), (0.5, 1), (0.6, 2), (0.7, 1), (0.8, 3), (0.9, 2)] {
+        let limit = format!("controller.torque_limit_nm={limit_nm}");
+        let scenario = Scenario::default()
+            .with_overrides("weak", &[limit])
+            .unwrap();
+        let (found, _) = identified(&scenario, seed, None);
+        let refusal = found.map(|_| ()).unwrap_err();
+        let expected =
+            format!("a torque was at its limit (controller.torque_limit_nm = {limit_nm})");
+        assert!(refusal.contains(&expected), "{limit_nm}, {seed}: {refusal}");
+    }
+}
+
 /// Zeros that are wrong by almost 3° lift a tip that presses with 4 N only.
 #[test]
 #[ignore = "a long identification"]
@@ -235,22 +276,6 @@ fn a_tip_rests_on_its_belt_before_it_slides() {
         let slide = slide_scenario(&scenario, 0.2, posture, 4.0).unwrap();
         assert!(rig.slide(index, &slide, posture).unwrap().is_complete);
     }
-/// Simulated arms with the elbow up take more than 1.2 N·m.
-#[test]
-fn a_torque_limit_that_is_too_low_is_named_before_all_that_follows_from_it() {
-    for (limit_nm, seed) in [(0.4, 3), (0.5, 1), (0.6, 2), (0.7, 1), (0.8, 3), (0.9, 2)] {
-        let limit = format!("controller.torque_limit_nm={limit_nm}");
-        let scenario = Scenario::default()
-            .with_overrides("weak", &[limit])
-            .unwrap();
-        let (found, _) = identified(&scenario, seed, None);
-        let refusal = found.map(|_| ()).unwrap_err();
-        let expected =
-            format!("a torque was at its limit (controller.torque_limit_nm = {limit_nm})");
-        assert!(refusal.contains(&expected), "{limit_nm}, {seed}: {refusal}");
-    }
-}
-
     assert!(rig.largest_force_n < 7.0, "{}", rig.largest_force_n);
 }
 
