@@ -2,6 +2,7 @@
 //!
 //! - [`plant`]: the interface of a plant
 //! - [`mechanics`]: the arm on its belt, as a hybrid rigid-body model
+//! - [`belt_line`]: the postures on the belt, and how far a tip is from the edges p = 0
 //! - [`converters`]: encoders, force cell, torque stages and the link's losses
 //! - [`decimal`]: settings in single precision as they were written
 //! - [`law_choice`]: the control law as a setting, from the program's set of laws
@@ -13,6 +14,7 @@
 //! - [`sample`]: both frames of a tick and the plant's true state, for records
 //! - [`statistics`]: counts and extremes of a run
 
+pub mod belt_line;
 pub mod closed_loop;
 pub mod contact_probe;
 pub mod controller_host;

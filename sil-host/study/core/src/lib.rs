@@ -7,12 +7,10 @@
 //!   at a time
 //! - [`case`], [`trial`]: closed loops to study, and their execution in this process;
 //!   [`loop_study`]: the same with a user-defined plant
-//! - [`belt_line`]: the postures on the belt
 //! - [`figures`]: the page that compares the studies with the paper
 //!
 //! The rows of a [`Study`] can be computed in any order, on any number of threads, or in shards.
 
-pub mod belt_line;
 pub mod case;
 pub mod catalogue;
 pub mod figures;

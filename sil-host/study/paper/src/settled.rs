@@ -71,9 +71,9 @@ pub fn has_settled(plant: &ArmOnBelt) -> bool {
 mod tests {
     use super::*;
     use painleve_plant::ContactMode;
+    use painleve_plant::belt_line::bisected;
     use painleve_plant::mechanics::PlantParameters;
     use painleve_shared::{Arm, ArmParameters, Posture};
-    use painleve_study_core::belt_line::bisected;
 
     fn plant(parameters: &PlantParameters, theta1_deg: f64, theta2_deg: f64) -> ArmOnBelt {
         let initial = State::new(theta1_deg.to_radians(), theta2_deg.to_radians(), 0.0, 0.0);

@@ -2,8 +2,8 @@
 
 use painleve_chart::style::{BLUE_INK, GREY, VERMILLION};
 use painleve_chart::{Chart, Mark, Panel};
+use painleve_plant::belt_line::BeltLine;
 use painleve_shared::{Arm, Slip};
-use painleve_study_core::belt_line::BeltLine;
 use painleve_study_core::outcome::Figure;
 
 use super::Admissible;

@@ -6,9 +6,9 @@ mod options;
 mod outcome;
 mod page;
 
+use painleve_plant::belt_line::{BeltLine, least, positive_stretches};
 use painleve_shared::range;
 use painleve_shared::{Arm, ArmParameters, Posture, Slip};
-use painleve_study_core::belt_line::{BeltLine, least, positive_stretches};
 use painleve_study_core::{Study, StudyError};
 use serde::Serialize;
 

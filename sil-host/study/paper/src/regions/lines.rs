@@ -1,7 +1,7 @@
 //! The lines p = 0 and b = 0, accurate to rounding.
 
+use painleve_plant::belt_line::{BeltLine, bisected, positive_stretches};
 use painleve_shared::{Arm, GeneralisedTorque, LinkMotion, Pose, Posture, Slip};
-use painleve_study_core::belt_line::{BeltLine, bisected, positive_stretches};
 
 use super::Theta2;
 

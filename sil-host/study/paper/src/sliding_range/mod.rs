@@ -14,11 +14,11 @@ mod page;
 
 use std::collections::BTreeMap;
 
+use painleve_plant::belt_line::{BeltLine, positive_stretches};
 use painleve_plant::mechanics::BuiltInPlant;
 use painleve_plant::scenario::Scenario;
 use painleve_plant::statistics::Statistics;
 use painleve_shared::{Arm, Posture, Slip};
-use painleve_study_core::belt_line::{BeltLine, positive_stretches};
 use painleve_study_core::case::{self, ControllerChoice, ConverterChoice, Reference};
 use painleve_study_core::loop_study::{LoopStudy, MakePlant};
 use painleve_study_core::tabular::Tabular;

@@ -1,9 +1,9 @@
 //! Small studies of effects, and their table from rows made by hand.
 
 use crate::plain;
+use painleve_plant::belt_line::BeltLine;
 use painleve_plant::mechanics::motion::theta;
 use painleve_shared::{Arm, Posture, Slip};
-use painleve_study_core::belt_line::BeltLine;
 use painleve_study_core::outcome::Figure;
 use painleve_study_core::rows;
 

@@ -8,8 +8,8 @@ use painleve_shared::kinematics::Pose;
 use painleve_shared::{Arm, JointTorque, Slip};
 
 use super::NotHeld;
+use painleve_plant::belt_line::p_ratio;
 use painleve_study_core::StudyError;
-use painleve_study_core::belt_line::p_ratio;
 use painleve_study_core::trial::Trial;
 
 /// Time in which the tip comes to rest and the slow estimates settle, s.

@@ -31,7 +31,7 @@ use painleve_plant::scenario::Scenario;
 use painleve_shared::{Arm, Posture, Slip};
 use serde::Serialize;
 
-use painleve_study_core::belt_line;
+use painleve_plant::belt_line;
 use painleve_study_core::case::{self, ControllerChoice, ConverterChoice};
 use painleve_study_core::tabular::Tabular;
 use painleve_study_core::{Study, StudyError, check_rows};

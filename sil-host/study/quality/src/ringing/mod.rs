@@ -14,9 +14,9 @@ mod tests;
 
 use std::collections::BTreeMap;
 
+use painleve_plant::belt_line::{BeltLine, positive_stretches};
 use painleve_plant::scenario::Scenario;
 use painleve_shared::{Arm, Posture, Slip};
-use painleve_study_core::belt_line::{BeltLine, positive_stretches};
 use painleve_study_core::tabular::Tabular;
 use painleve_study_core::trial::Trial;
 use painleve_study_core::{Study, StudyError, check_rows};

@@ -2,11 +2,11 @@
 
 use core::ops::Range;
 
+use painleve_plant::belt_line::admissible_m;
 use painleve_plant::mechanics::belt::BeltProfile;
 use painleve_plant::scenario::Scenario;
 use painleve_shared::{Arm, Posture, Slip};
 use painleve_study_core::StudyError;
-use painleve_study_core::belt_line::admissible_m;
 use painleve_study_core::case::{self, Reference};
 use rand::rngs::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};

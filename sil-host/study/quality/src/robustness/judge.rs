@@ -3,6 +3,7 @@
 use core::ops::Range;
 
 use painleve_plant::Plant;
+use painleve_plant::belt_line::{admissible_m, p_ratio};
 use painleve_plant::contact_probe::{CAPTURE_S, ContactProbe};
 use painleve_plant::mechanics::motion::theta;
 use painleve_plant::scenario::Scenario;
@@ -10,7 +11,6 @@ use painleve_plant::smoothness::Smoothness;
 use painleve_shared::frame::StatusFlags;
 use painleve_shared::{Arm, Posture, Slip};
 use painleve_study_core::StudyError;
-use painleve_study_core::belt_line::{admissible_m, p_ratio};
 use painleve_study_core::trial::Trial;
 
 use super::{Ending, FalseAlarms, Row};

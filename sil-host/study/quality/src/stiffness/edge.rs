@@ -1,10 +1,10 @@
 //! The farthest tip position on which a pressed tip stays, by trial.
 
 use nalgebra::Vector2;
+use painleve_plant::belt_line::BeltLine;
 use painleve_plant::{Plant, State};
 use painleve_shared::{Arm, GeneralisedTorque, LinkMotion, Pose, Posture, Slip};
 use painleve_study_core::StudyError;
-use painleve_study_core::belt_line::BeltLine;
 
 use super::Stiffness;
 

@@ -52,7 +52,7 @@ fn the_end_of_the_belt_goes_to_where_p_is_zero() {
     let study = study();
     let arm = painleve_shared::Arm::new(study.parameters.arm).unwrap();
     for posture in [Posture::ElbowUp, Posture::ElbowDown] {
-        let line = painleve_study_core::belt_line::BeltLine::new(&arm, posture);
+        let line = painleve_plant::belt_line::BeltLine::new(&arm, posture);
         let p = |tip_t_m: f64| {
             let tau = line.tau(tip_t_m).unwrap();
             line.p_per_kg(

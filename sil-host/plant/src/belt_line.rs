@@ -16,6 +16,9 @@ const USED_REACH: f64 = 0.97;
 /// between its own points.
 const POINTS: usize = 4096;
 
+/// Number of points between a tip and an edge at which a dip of p/Q22 is looked for.
+const POINTS_TO_EDGE: usize = 128;
+
 /// The tip on the belt of an arm in one posture.
 #[derive(Clone, Copy, Debug)]
 pub struct BeltLine<'a> {
@@ -86,6 +89,52 @@ impl<'a> BeltLine<'a> {
         } else {
             f64::INFINITY
         }
+    }
+
+    /// Returns how far a tip is before the edge p = 0 that is next in a direction along the belt, +1 or −1, m; negative if
+    /// the tip is beyond it. `None` if p is positive from the tip as far as the arm reaches, or if p/Q22 falls and rises
+    /// again before the edge: a tip that is held there is held by its least value.
+    pub fn before_edge_m(
+        &self,
+        tip_t_m: f64,
+        direction: f64,
+        friction: f64,
+        slip: Slip,
+    ) -> Option<f64> {
+        let mut stretches = positive_stretches(|tau| self.p_per_kg(tau, friction, slip));
+        if direction < 0.0 {
+            stretches = stretches
+                .into_iter()
+                .rev()
+                .map(|(from, to)| (-to, -from))
+                .collect();
+        }
+        let tip = direction.signum() * tip_t_m;
+        // A tip where p is not positive has left the stretch behind it.
+        let (_, end) = stretches
+            .into_iter()
+            .take_while(|&(start, _)| self.tip_t_m(start) <= tip)
+            .last()?;
+        if end >= core::f64::consts::FRAC_PI_2 {
+            return None;
+        }
+        let before_m = self.tip_t_m(end) - tip;
+        if before_m > 0.0 {
+            let start = self.tau(tip)?;
+            let p_ratio = |number: usize| {
+                let tau = start + (end - start) * (number as f64 / POINTS_TO_EDGE as f64);
+                self.p_ratio(direction.signum() * tau, friction, slip)
+            };
+            let (mut last, mut falls) = (p_ratio(0), false);
+            for next in (1..=POINTS_TO_EDGE).map(p_ratio) {
+                if falls && next > last {
+                    return None;
+                }
+                falls |= next < last;
+                last = next;
+            }
+        }
+        Some(before_m)
     }
 }
 
@@ -283,5 +332,32 @@ mod tests {
         let Least { tau, value } = least(|t| 2.0 + (t - 0.1234).powi(2));
         assert!((tau - 0.1234).abs() < 1e-7 && value == 2.0, "{tau} {value}");
         assert_eq!(least(|t| t).tau, -core::f64::consts::FRAC_PI_2);
+    }
+    #[test]
+    fn the_edge_is_the_one_ahead_of_the_tip_up_to_the_full_reach() {
+        let arm = Arm::new(ArmParameters::default()).unwrap();
+        let before_m = |posture, tip_m: f64, direction| {
+            let line = BeltLine::new(&arm, posture);
+            line.before_edge_m(tip_m, direction, 0.6, Slip::Positive)
+        };
+        // The stretches for μ = 0.6 end at 0.16470 m and 0.18269 m; on the other side, both end with the reach.
+        for (posture, tip_m, edge_m) in [
+            (Posture::ElbowDown, 0.163, 0.16470),
+            (Posture::ElbowDown, 0.17, 0.16470),
+            (Posture::ElbowUp, 0.18, 0.18269),
+        ] {
+            let found_m = before_m(posture, tip_m, 1.0).unwrap();
+            assert!((found_m - (edge_m - tip_m)).abs() < 1e-5, "{found_m}");
+            assert_eq!(before_m(posture, 0.1, -1.0), None);
+        }
+        // For μ = 0.95 elbow up, p/Q22 is least, but positive, near −0.06 m; the edge ahead is at 0.165 m.
+        let line = BeltLine::new(&arm, Posture::ElbowUp);
+        let ahead_m = |tip_m| line.before_edge_m(tip_m, 1.0, 0.95, Slip::Positive);
+        assert_eq!(ahead_m(-0.1), None);
+        assert!((ahead_m(0.0).unwrap() - 0.165).abs() < 2e-3);
+        let line = BeltLine::new(&arm, Posture::ElbowDown);
+        let mirrored = line.before_edge_m(0.163, 1.0, 0.6, Slip::Negative);
+        assert_eq!(mirrored, None);
+        assert_eq!(line.before_edge_m(-0.1, 1.0, 0.05, Slip::Positive), None);
     }
 }
