@@ -1,12 +1,14 @@
 //! How far a tip on the belt is from the paradox: p/Q22, and the distance to the place where p = 0.
 
+use painleve_plant::belt_line::BeltLine;
+use painleve_plant::nalgebra::Matrix2;
 use painleve_plant::scenario::Scenario;
-use painleve_shared::{Arm, LinkMotion, OutOfRange, Pose, Posture};
+use painleve_shared::{Arm, LinkMotion, OutOfRange, Pose, Posture, Slip};
 
 /// Intervals in which a change of sign of p along the belt is looked for.
 const INTERVALS: usize = 128;
-/// Usable fraction of the reach: at the full reach the arm is straight.
-const USED_REACH: f64 = 0.97;
+/// Fraction of the reach that is searched: at the full reach the arm is straight, and p is not known there.
+const SEARCHED_REACH: f64 = 0.999_999;
 /// A change of the signed friction coefficient below which the places of p = 0 stay: they move by about 0.1 m per unit.
 const SAME_FRICTION: f64 = 1e-7;
 /// The signed friction coefficient follows from p only where Q12 is not small beside Q22.
@@ -58,8 +60,7 @@ impl ParadoxDistance {
             return Distance::UNKNOWN;
         }
         let posture = Posture::of(theta);
-        if q.m12.abs() > LEAST_COUPLING * q.m22 {
-            let signed_friction = (q.m22 - p_per_kg) / q.m12;
+        if let Some(signed_friction) = signed_friction(&q, p_per_kg) {
             let is_same = self.edges.as_ref().is_some_and(|(known, of_posture, _)| {
                 (known - signed_friction).abs() < SAME_FRICTION && *of_posture == posture
             });
@@ -81,9 +82,27 @@ impl ParadoxDistance {
         }
     }
 
+    /// Returns how far a tip that is held back at link angles (rad), with p in 1/kg, is before the edge p = 0 that is next
+    /// in the direction in which it is held, +1 or −1, m; 0 inside the paradox. `None` if there is no such edge: the tip is
+    /// held by another limit.
+    pub fn before_edge_m(
+        &self,
+        theta: &LinkMotion<f64>,
+        p_per_kg: f64,
+        direction: f64,
+    ) -> Option<f64> {
+        let pose = Pose::new(theta);
+        let q = self.arm.inverse_tip_inertia_per_kg(&pose);
+        let friction = signed_friction(&q, p_per_kg)?;
+        let line = BeltLine::new(&self.arm, Posture::of(theta));
+        let tip_m = self.arm.tip_m(&pose).x;
+        line.before_edge_m(tip_m, direction, friction.abs(), Slip::of(friction))
+            .map(|distance_m| distance_m.max(0.0))
+    }
+
     /// Returns the places on the belt with p = 0, m.
     fn edges_m(&self, signed_friction: f64, posture: Posture) -> Vec<f64> {
-        let reach_m = USED_REACH * self.arm.reach_on_belt_m();
+        let reach_m = SEARCHED_REACH * self.arm.reach_on_belt_m();
         let p = |tip_m: f64| {
             let row = self.arm.inverse_inertia_row_on_belt(tip_m, posture);
             row.map_or(f64::NAN, |row| row.q22 - signed_friction * row.q12)
@@ -110,21 +129,32 @@ impl ParadoxDistance {
     }
 }
 
+/// Returns the product of slip sign and friction coefficient that p contains; `None` where it hardly depends on friction.
+fn signed_friction(q: &Matrix2<f64>, p_per_kg: f64) -> Option<f64> {
+    let is_coupled = p_per_kg.is_finite() && q.m12.abs() > LEAST_COUPLING * q.m22;
+    is_coupled.then(|| (q.m22 - p_per_kg) / q.m12)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use painleve_shared::Slip;
+
+    /// Puts the tip of the paper's arm on the belt, and returns link angles and p.
+    fn placed(
+        tip_m: f64,
+        posture: Posture,
+        friction: f64,
+    ) -> (ParadoxDistance, LinkMotion<f64>, f64) {
+        let distance = ParadoxDistance::new(&Scenario::default()).unwrap();
+        let arm = &distance.arm;
+        let theta = arm.link_angles_on_belt_rad(tip_m, posture).unwrap();
+        let p = arm.p_per_kg(&Pose::new(&theta), friction, Slip::Positive);
+        (distance, theta, p)
+    }
 
     /// Measures with the tip on the belt.
     fn at(tip_m: f64, friction: f64) -> Distance {
-        let mut distance = ParadoxDistance::new(&Scenario::default()).unwrap();
-        let theta = distance
-            .arm
-            .link_angles_on_belt_rad(tip_m, Posture::ElbowDown)
-            .unwrap();
-        let p = distance
-            .arm
-            .p_per_kg(&Pose::new(&theta), friction, Slip::Positive);
+        let (mut distance, theta, p) = placed(tip_m, Posture::ElbowDown, friction);
         distance.measure(&theta, p)
     }
 
@@ -141,6 +171,21 @@ mod tests {
             without.edge_m.is_nan() && without.p_ratio > 0.5,
             "{without:?}"
         );
+    }
+
+    #[test]
+    fn an_edge_behind_the_tip_does_not_hold_it_and_one_at_the_end_of_the_reach_does() {
+        let (distance, theta, p) = placed(-0.039, Posture::ElbowUp, 0.95);
+        assert_eq!(distance.before_edge_m(&theta, p, -1.0), None);
+        assert!(distance.before_edge_m(&theta, p, 1.0).unwrap() > 0.2);
+        // For μ = 0.6, elbow up, p = 0 at 0.18269 m: in the last hundredth of the reach.
+        let (mut distance, theta, p) = placed(0.182, Posture::ElbowUp, 0.6);
+        let before_m = distance.before_edge_m(&theta, p, 1.0).unwrap();
+        assert!((before_m - 0.00069).abs() < 1e-5, "{before_m}");
+        let nearest_m = distance.measure(&theta, p).edge_m;
+        assert!((nearest_m - before_m).abs() < 1e-9, "{nearest_m}");
+        let (distance, theta, p) = placed(0.17, Posture::ElbowDown, 0.6);
+        assert_eq!(distance.before_edge_m(&theta, p, 1.0), Some(0.0));
     }
 
     #[test]

@@ -80,7 +80,8 @@ pub struct RunReport {
     /// Distance of the tip from the governed reference at the end, m.
     #[serde(default)]
     pub error_m: f64,
-    /// Distance of the tip at the end from the place with p = 0, m; null unless an edge holds the reference back.
+    /// Distance of the tip at the end from the place with p = 0 towards the request, m; null unless such an edge, and not
+    /// the end of the reach or another limit of the governor, holds the reference back.
     #[serde(default)]
     pub to_edge_m: Option<f64>,
     /// Part of the governor's distance from the edges that is kept for what is not known of the arm, m; 0 unless an edge
@@ -344,16 +345,17 @@ impl RunReport {
 /// Why a distance is kept if `[knowledge]` does not say it.
 const UNKNOWN_PLACE: &str = "the tip is known to controller.estimator.tip_deviation_m";
 
-/// Returns how far the tip rests from the edge that holds its reference back, m.
+/// Returns how far the tip rests from the edge p = 0 in the direction in which its reference is held back, m.
 fn to_edge_m(scenario: &Scenario, result: &LoopResult) -> Option<f64> {
     if !result.at_edge {
         return None;
     }
-    let mut distance = ParadoxDistance::new(scenario).ok()?;
-    let edge_m = distance
-        .measure(&result.final_theta_rad, result.final_p_per_kg)
-        .edge_m;
-    edge_m.is_finite().then_some(edge_m)
+    let direction = (scenario.target_m()? - result.final_reference_m).signum();
+    ParadoxDistance::new(scenario).ok()?.before_edge_m(
+        &result.final_theta_rad,
+        result.final_p_per_kg,
+        direction,
+    )
 }
 
 /// Returns by how much the governor's distance is larger because the arm is not known exactly, m.

@@ -453,3 +453,27 @@ fn a_run_held_by_an_edge_reports_how_near_it_rests_and_why_not_nearer() {
     let free = bench.report(&[&["run", "hybrid-elbow-down"], &quiet[..]].concat());
     assert_eq!(free["to_edge_m"], Value::Null);
 }
+
+#[test]
+fn only_an_edge_towards_the_request_is_reported() {
+    let bench = Bench::new("ahead");
+    let to_edge = |line: &[&str]| {
+        let quiet = ["--no-record", "--no-plot", "--json"];
+        bench.report(&[&["run"], line, &quiet[..]].concat())["to_edge_m"].clone()
+    };
+    // Held where p/Q22 is least, and at the end of the reach.
+    let least = [
+        "--set",
+        "belt.friction=0.95",
+        "--set",
+        "initial={tip_m=0.1,elbow=\"up\"}",
+        "--set",
+        "controller.reference=[{minimum-jerk={target_m=-0.183,duration_s=3.0}}]",
+    ];
+    assert_eq!(to_edge(&least), Value::Null);
+    assert_eq!(to_edge(&["--replay", "1:2"]), Value::Null);
+    // Elbow up, p = 0 at 0.18269 m, short of the full reach of 0.18410 m.
+    let near = "controller.reference.0.minimum-jerk.target_m=0.183";
+    let near_m = to_edge(&["hybrid-elbow-up", "--set", near]).as_f64();
+    assert!(near_m.is_some_and(|near_m| (0.0..0.005).contains(&near_m)));
+}
