@@ -130,8 +130,8 @@ fn describe(name: &str, rows: &[Row]) -> (Proportion, Percentiles) {
         );
     }
     let held = kept.iter().filter(|row| row.ending == Ending::AtEdge);
-    let to_edge_m = Percentiles::of(held.map(|row| row.to_edge_m).collect());
-    println!("  where the edge held it, m before it: {to_edge_m:?}");
+    let to_edge_m = Percentiles::of(held.filter_map(|row| row.to_edge_m).collect());
+    println!("  where an edge held it, m before it: {to_edge_m:?}");
     let lost = rows.iter().filter(|row| !row.ending.is_kept());
     for row in lost {
         println!(

@@ -223,6 +223,9 @@ impl Outcome for EffectsOutcome {
                     format!("{median:.2} ({p95:.2})")
                 })
             };
+            // Not all runs are held by an edge.
+            let held = place.and_then(|place| place.to_edge_m);
+            let held = held.map_or(String::new(), |values| format!(", {} runs", values.count));
             let [most, some, half] = series.falls_below.map(|fall| fall.to_string());
             let is_new = before != loop_of;
             table.add_row([
@@ -234,7 +237,7 @@ impl Outcome for EffectsOutcome {
                 series.name(),
                 cells.collect::<Vec<_>>().join(", "),
                 millimetres(|place| place.error_m),
-                millimetres(|place| place.to_edge_m),
+                millimetres(|place| place.to_edge_m) + &held,
                 most,
                 some,
                 half,

@@ -186,7 +186,7 @@ fn the_table_interpolates_between_levels() {
             fault: None,
             lift_offs: 0,
             error_m: 1e-4 * (run + 1) as f64,
-            to_edge_m: 2e-3,
+            to_edge_m: None,
             p_ratio: 0.5,
             tip_t_m: 0.1,
             target_m: Some(0.1),

@@ -3,7 +3,7 @@
 use core::ops::Range;
 
 use painleve_plant::Plant;
-use painleve_plant::belt_line::{admissible_m, p_ratio};
+use painleve_plant::belt_line::{BeltLine, admissible_m, p_ratio};
 use painleve_plant::contact_probe::{CAPTURE_S, ContactProbe};
 use painleve_plant::mechanics::motion::theta;
 use painleve_plant::scenario::Scenario;
@@ -21,7 +21,7 @@ pub const CAPTURE_LIMIT_S: f64 = 0.5;
 const WATCHED_S: f64 = 0.1;
 /// Largest final distance from target or governed edge, beyond the encoders' resolution, m.
 const WITHIN_M: f64 = 1e-3;
-/// Largest distance before the true edge at which a governed reference may be held, m.
+/// Largest distance before the true edge, or before the end of the usable reach, at which a governed reference may be held, m.
 const SHORT_M: f64 = 0.01;
 /// Largest p, as a fraction of Q22, at which a governed reference may be held farther from the
 /// edge: where p hardly changes along the belt, a small change of friction moves
@@ -94,12 +94,18 @@ pub fn run<P: Plant>(
     // Of the arm as it stands, not as it would on the undeformed belt: 10 N press the tip 1 mm into a belt of 1e4 N/m,
     // which near the edge changes p/Q22 by a tenth.
     let p_ratio = p_ratio(&arm, &trial.theta_rad(), friction, slip);
-    let to_edge_m = if target_m.is_some_and(|target_m| target_m > start_m) {
-        stretch.end - trial.tip_t_m()
+    let tip_t_m = trial.tip_t_m();
+    let ahead_m = if target_m.is_some_and(|target_m| target_m > start_m) {
+        stretch.end - tip_t_m
     } else {
-        trial.tip_t_m() - stretch.start
+        tip_t_m - stretch.start
     };
     let at_edge = trial.answer().flags.contains(StatusFlags::AT_EDGE);
+    let to_edge_m = target_m.filter(|_| at_edge).and_then(|target_m| {
+        let held_m = target_m - trial.answer().reference_tip.to_metres();
+        let line = BeltLine::new(&arm, posture);
+        line.before_edge_m(tip_t_m, held_m.signum(), friction, slip)
+    });
     let captured = contact
         .captured_s
         .is_some_and(|start_s| start_s + CAPTURE_S <= enabled_s + CAPTURE_LIMIT_S);
@@ -114,7 +120,7 @@ pub fn run<P: Plant>(
     } else if of_target_m <= tolerance_m {
         Ending::Reached
     } else if at_edge && of_governed_m <= tolerance_m {
-        if to_edge_m > SHORT_M && p_ratio > SHORT_P_RATIO {
+        if ahead_m > SHORT_M && p_ratio > SHORT_P_RATIO {
             Ending::StoppedEarly
         } else {
             Ending::AtEdge
@@ -143,7 +149,7 @@ pub fn run<P: Plant>(
         torque_change_holding_nm: smoothness.holding.torque_change_nm(converters),
         torque_reversals: smoothness.holding.reversals(),
         force_ripple_n: smoothness.holding.force_ripple_n(),
-        tip_t_m: trial.tip_t_m(),
+        tip_t_m,
         target_m,
         posture,
         mu: scenario.belt.friction,

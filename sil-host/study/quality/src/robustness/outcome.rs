@@ -18,20 +18,20 @@ const WORST: usize = 20;
 pub struct Place {
     /// Distance from the governed reference, m.
     pub error_m: Option<Percentiles>,
-    /// Distance from the true edge where the governed edge holds it, m.
+    /// Distance from the true edge where one holds it, m.
     pub to_edge_m: Option<Percentiles>,
 }
 
 impl Place {
-    /// Collects the endings of runs: each with its error and its distance from the edge, m.
-    pub fn of(runs: impl Iterator<Item = (Ending, f64, f64)> + Clone) -> Self {
+    /// Collects the endings of runs: each with its error and its distance from the edge that holds it, m.
+    pub fn of(runs: impl Iterator<Item = (Ending, f64, Option<f64>)> + Clone) -> Self {
         let kept = runs.filter(|(ending, ..)| ending.is_kept());
         let at_edge = kept
             .clone()
             .filter(|(ending, ..)| *ending == Ending::AtEdge);
         Self {
             error_m: Percentiles::of(kept.map(|(_, error_m, _)| error_m).collect()),
-            to_edge_m: Percentiles::of(at_edge.map(|(.., to_edge_m)| to_edge_m).collect()),
+            to_edge_m: Percentiles::of(at_edge.filter_map(|(.., to_edge_m)| to_edge_m).collect()),
         }
     }
 }
@@ -50,7 +50,7 @@ pub struct RobustnessOutcome {
     /// Success rate.
     pub success: Proportion,
     /// Distance of the tip from the governed reference at the end of the runs in which it was kept, and how far before
-    /// the edge it ends where the edge holds it.
+    /// the edge it ends where an edge holds it.
     #[serde(flatten)]
     pub place: Place,
     /// Change of torque from tick to tick in these runs while the tip moves, N·m.
@@ -174,7 +174,13 @@ impl Outcome for RobustnessOutcome {
             table.add_row([name, &values, "", "", "", ""]);
         }
         for (ending, count) in &self.endings {
-            table.add_row([&outcome::name(ending), &count.to_string(), "", "", "", ""]);
+            let mut runs = count.to_string();
+            if *ending == Ending::AtEdge {
+                // The others are held by the end of the reach, or by a p that is small but stays positive.
+                let before = self.place.to_edge_m.map_or(0, |values| values.count);
+                runs += &format!(", {before} of them before p = 0");
+            }
+            table.add_row([&outcome::name(ending), &runs, "", "", "", ""]);
         }
         let alarms = format!("{} in {:.2} h", self.false_alarms, self.slid_h);
         table.add_row(["false alarms", &alarms, "", "", "", ""]);

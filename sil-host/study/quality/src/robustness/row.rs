@@ -87,8 +87,9 @@ pub struct Row {
     pub resting_error_m: Option<f64>,
     /// Tolerance of the final distance, m.
     pub tolerance_m: f64,
-    /// Distance of the tip from the edge p = 0 or the usable reach ahead, m.
-    pub to_edge_m: f64,
+    /// How far the tip is before the edge p = 0 towards the target, m; negative beyond it, null unless such an edge, and
+    /// not the end of the reach or another limit of the governor, holds the reference back.
+    pub to_edge_m: Option<f64>,
     /// p in the arm's final posture as a fraction of Q22.
     pub p_ratio: f64,
     /// Number of times that contact was mistaken for flight while the tip slid.

@@ -21,7 +21,7 @@ pub(super) fn row(index: usize, ending: Ending, error_m: f64) -> Row {
         error_m,
         resting_error_m: Some(error_m),
         tolerance_m: 1e-3,
-        to_edge_m: 0.05,
+        to_edge_m: (ending == Ending::AtEdge).then_some(0.05),
         p_ratio: 0.6,
         false_alarms: u32::from(ending == Ending::LiftOff),
         slid_s: if is_captured { 360.0 } else { 0.0 },
@@ -75,6 +75,17 @@ fn every_ending_is_counted_and_the_most_severe_come_first() {
         ]),
     );
     insta::assert_snapshot!(plain(&found));
+}
+
+#[test]
+fn a_tip_that_no_edge_holds_is_left_out_of_the_distances_before_the_edge() {
+    let mut rows = rows(&[(Ending::AtEdge, 1e-4), (Ending::AtEdge, 1e-4)]);
+    rows[1].to_edge_m = None;
+    let found = RobustnessOutcome::new(&campaign(2), rows);
+    assert_eq!(found.success.successes, 2);
+    assert_eq!(found.place.to_edge_m.map(|values| values.count), Some(1));
+    let table = plain(&found);
+    assert!(table.contains("2, 1 of them before p = 0"), "{table}");
 }
 
 #[test]

@@ -36,6 +36,14 @@ fn every_run_has_an_ending_and_every_failed_one_is_listed() {
     assert_eq!(outcome.worst.len(), failed);
 }
 
+/// Run 2 of seed 1 asks for the end of the reach, where p is 2.34 Q22.
+#[test]
+fn the_end_of_the_reach_is_not_an_edge() {
+    let row = campaign(5).row(2).unwrap();
+    assert_eq!(row.ending, Ending::AtEdge, "{row:?}");
+    assert!(row.p_ratio > 2.0 && row.to_edge_m.is_none(), "{row:?}");
+}
+
 /// If 99.45 % of all runs succeed, as in the campaign, fewer than 98 of 100 do with a probability of 0.02 (binomial); if
 /// 97 %, with one of 0.58.
 #[test]
