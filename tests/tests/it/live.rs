@@ -260,7 +260,10 @@ fn a_run_outlives_settings_that_cannot_be_started() {
     assert_eq!(viewer.answer().unwrap(), note);
     viewer.order(&json!("reset"));
     let refusal = viewer.answer().unwrap_err();
-    assert!(refusal.contains("initial tip height"), "{refusal}");
+    assert!(
+        refusal.contains("initial.tip_m puts it on the belt"),
+        "{refusal}"
+    );
     viewer.set("belt.friction", "0.5");
     assert_eq!(viewer.answer().unwrap(), "belt.friction: set");
 }

@@ -336,10 +336,11 @@ impl Live {
 
 /// Starts plant and controller of a scenario.
 fn start(scenario: &Scenario, viewers: &Viewers) -> Result<ClosedLoop<Host>, CommandError> {
-    let range = |source| ScenarioError::range(&scenario.name, source);
-    let controller = Controller::new(&scenario.controller_configuration()).map_err(range)?;
+    let (name, initial) = (&scenario.name, &scenario.initial);
+    let controller = Controller::new(&scenario.controller_configuration())
+        .map_err(|source| ScenarioError::range(name, source))?;
     Ok(ClosedLoop::new(
-        Simulation::new(scenario).map_err(range)?,
+        Simulation::new(scenario).map_err(|source| ScenarioError::start(name, initial, source))?,
         viewers.host(controller),
     ))
 }

@@ -27,6 +27,9 @@ pub fn theta_dot(state: &State) -> LinkMotion<f64> {
 /// initial conditions to three digits.
 const CONTACT_AT_START_M: f64 = 1e-4;
 
+/// What is out of range if a start is inside the belt: no setting by itself, but what follows from several.
+pub(crate) const INITIAL_HEIGHT: &str = "initial tip height over the belt in m";
+
 /// Deepest start inside the belt that is treated as a rounding error, m.
 const INSIDE_AT_START_M: f64 = 1e-3;
 
@@ -365,7 +368,7 @@ impl Motion<'_> {
     ) -> Result<Option<State>, OutOfRange> {
         let gap_m = self.gap_m(start);
         range::check(
-            "initial tip height over the belt in m",
+            INITIAL_HEIGHT,
             gap_m,
             -INSIDE_AT_START_M,
             self.arm.height_m() + self.arm.reach_m(),

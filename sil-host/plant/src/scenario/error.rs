@@ -3,8 +3,9 @@
 use painleve_shared::range::OutOfRange;
 use painleve_shared::settings::Field;
 
-use super::built_in;
 use super::words::{TomlError, in_words, known_names};
+use super::{InitialState, built_in};
+use crate::mechanics::motion::INITIAL_HEIGHT;
 
 /// Upper limit of the levels of a key; no scenario key has as many.
 pub(super) const MOST_LEVELS: usize = 16;
@@ -70,6 +71,22 @@ pub enum ScenarioError {
         /// The effect's key.
         key: &'static str,
     },
+    /// The arm would start inside the belt.
+    #[error(
+        "{origin}: initial.theta1_deg = {} and initial.theta2_deg = {} put the tip {:.1} mm inside the belt of this arm; \
+         initial.tip_m puts it on the belt of any arm",
+        theta_deg[0],
+        theta_deg[1],
+        -1e3 * height_m
+    )]
+    InsideBelt {
+        /// File or scenario.
+        origin: String,
+        /// The link angles, degrees.
+        theta_deg: [f64; 2],
+        /// Height of the tip over the belt, m.
+        height_m: f64,
+    },
     /// A value is out of range.
     #[error("{origin}: {source}")]
     Range {
@@ -86,6 +103,22 @@ impl ScenarioError {
         Self::Range {
             origin: scenario.into(),
             source,
+        }
+    }
+
+    /// A start of a scenario's arm from which it cannot run.
+    pub fn start(scenario: &str, initial: &InitialState, source: OutOfRange) -> Self {
+        if source.key != INITIAL_HEIGHT || initial.tip_m.is_some() {
+            return Self::range(scenario, source);
+        }
+        let [theta_1, theta_2] = InitialState::X0_D_DEG;
+        Self::InsideBelt {
+            origin: scenario.into(),
+            theta_deg: [
+                initial.theta1_deg.unwrap_or(theta_1),
+                initial.theta2_deg.unwrap_or(theta_2),
+            ],
+            height_m: source.value,
         }
     }
 }

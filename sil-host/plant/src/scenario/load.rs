@@ -69,10 +69,7 @@ impl Scenario {
     fn checked_start(self, origin: &str) -> Result<Self, ScenarioError> {
         match BuiltInPlant::new(&self) {
             Ok(_) => Ok(self),
-            Err(source) => Err(ScenarioError::Range {
-                origin: origin.into(),
-                source,
-            }),
+            Err(source) => Err(ScenarioError::start(origin, &self.initial, source)),
         }
     }
 
@@ -352,7 +349,17 @@ mod tests {
                 &["impact.law=newton"],
                 &["impact.law", "poisson", "energetic"],
             ),
-            (&["initial.theta1_deg=0"], &["initial tip height"]),
+            (
+                &["initial.theta1_deg=0"],
+                &[
+                    "initial.theta1_deg = 0 and initial.theta2_deg = -35.1 put the tip 4.3 mm inside the belt",
+                    "initial.tip_m",
+                ],
+            ),
+            (
+                &["arm.height_m=0.36"],
+                &["initial.theta1_deg = -11.4 and", "17.7 mm inside"],
+            ),
             (
                 &["controller.law.hybrid.friction.observed.time_constant_s=11"],
                 &[
@@ -413,7 +420,7 @@ mod tests {
             ("belt.friction = 99", "standard input: belt.friction = 99"),
             (
                 "initial.theta1_deg = 0",
-                "standard input: initial tip height",
+                "standard input: initial.theta1_deg = 0 and",
             ),
             (
                 "effects.gear.elastic = true",
