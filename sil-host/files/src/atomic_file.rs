@@ -26,7 +26,7 @@ use crate::output_place::{OutputPlace, PlaceError, sync};
 /// Failure to write an output file.
 #[derive(Debug, thiserror::Error)]
 pub enum AtomicFileError {
-    /// The path is a folder, a device, or has no file name.
+    /// The path is a folder, a device or a pipe, or has no file name.
     #[error("`{path}` cannot be an output file: give the path of a regular file in a folder")]
     NotAFile {
         /// The requested path.
@@ -390,6 +390,7 @@ pub fn prepare(path: impl Into<PathBuf>, contents: &[u8]) -> Result<AtomicFile, 
 mod tests {
     use super::*;
     use nix::unistd::geteuid;
+    use std::os::fd::AsRawFd;
     use std::os::unix::fs::{PermissionsExt, lchown, symlink};
 
     fn names(folder: &Path) -> Vec<String> {
@@ -668,6 +669,19 @@ mod tests {
         // No user may create files there, not even root.
         let error = write("/proc/run.svg", b"").unwrap_err().to_string();
         assert!(error.contains("cannot write `/proc/run.svg`"), "{error}");
+    }
+
+    #[test]
+    fn an_open_pipe_is_no_file_and_its_link_not_to_be_removed() {
+        let folder = tempfile::tempdir().unwrap();
+        let (reader, _writer) = io::pipe().unwrap();
+        let pipe = PathBuf::from(format!("/proc/self/fd/{}", reader.as_raw_fd()));
+        let link = folder.path().join("link");
+        symlink(&pipe, &link).unwrap();
+        for path in [pipe, link] {
+            let error = AtomicFile::create(path).unwrap_err();
+            assert!(matches!(error, AtomicFileError::NotAFile { .. }), "{error}");
+        }
     }
 
     #[test]

@@ -23,7 +23,7 @@ const MOST_LINKS: usize = 40;
 /// Why a path has no place for an output file.
 #[derive(Debug)]
 pub(crate) enum PlaceError {
-    /// It is a folder or a device, or has no file name.
+    /// It is a folder, a device or a pipe, or has no file name.
     NotAFile,
     /// This link leads to nothing.
     Dangling(PathBuf),
@@ -139,7 +139,12 @@ impl Walk {
                 }
                 Entry::Missing if self.link.is_some() => {
                     let link = self.link.take().map_or(path, |(link, _)| link);
-                    return Err(PlaceError::Dangling(link));
+                    // The kernel follows its own links, such as those to open pipes, to what no name leads to.
+                    return Err(if link.exists() {
+                        PlaceError::NotAFile
+                    } else {
+                        PlaceError::Dangling(link)
+                    });
                 }
                 Entry::File | Entry::Missing if is_last => return Ok(name),
                 Entry::Missing => {
