@@ -249,6 +249,7 @@ impl CommandError {
                 StudyError::Scenario(_)
                 | StudyError::Grid(_)
                 | StudyError::Taken { .. }
+                | StudyError::Law { .. }
                 | StudyError::Ignored { .. }
                 | StudyError::OutOfReach { .. }
                 | StudyError::OffTheBelt { .. }

@@ -48,6 +48,14 @@ pub enum StudyError {
         /// What to do instead, or what sets the key.
         instead: String,
     },
+    /// An override sets a key of the law in a study that compares laws.
+    #[error(
+        "{key} cannot be set here: the study sets the law itself; choose it with --controller, by name or as a scenario file"
+    )]
+    Law {
+        /// The key.
+        key: String,
+    },
     /// The scenario has something that the study does not compute.
     #[error(
         "scenario {scenario}: {setting} has no effect here: this study computes the arm without it"

@@ -100,6 +100,18 @@ impl Overrides {
         taken.try_for_each(|(key, option)| self.refuse_key(key, &format!("use {option}")))
     }
 
+    /// Rejects overrides of the law, which has an effect but would leave the controllers with other laws than their names
+    /// say.
+    ///
+    /// # Errors
+    /// [`StudyError::Law`] naming the key.
+    pub fn refuse_law(&self) -> Result<(), StudyError> {
+        match self.first_that_sets("controller.law") {
+            Some(key) => Err(StudyError::Law { key: key.into() }),
+            None => Ok(()),
+        }
+    }
+
     /// Rejects overrides of keys that the study sets in every run.
     ///
     /// # Errors
@@ -110,14 +122,18 @@ impl Overrides {
     }
 
     fn refuse_key(&self, taken: &str, instead: &str) -> Result<(), StudyError> {
-        let mut overrides = self.overrides.iter();
-        match overrides.find_map(|text| scenario::sets(text, taken)) {
+        match self.first_that_sets(taken) {
             Some(key) => Err(StudyError::Taken {
                 key: key.to_owned(),
                 instead: instead.to_owned(),
             }),
             None => Ok(()),
         }
+    }
+
+    fn first_that_sets<'a>(&'a self, taken: &'a str) -> Option<&'a str> {
+        let mut overrides = self.overrides.iter();
+        overrides.find_map(|text| scenario::sets(text, taken))
     }
 }
 

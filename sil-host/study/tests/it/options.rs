@@ -96,6 +96,18 @@ fn another_contact_than_the_one_that_the_option_names_is_refused() {
 }
 
 #[test]
+fn a_law_that_the_study_sets_is_refused_with_the_option_that_chooses_it() {
+    let key = "controller.law.hybrid.normal_force_n";
+    assert_eq!(
+        refusal(&format!("loop --tip=0.1628 --set {key}=15.0")),
+        format!(
+            "{key} cannot be set here: the study sets the law itself; choose it with --controller, by name or as a \
+             scenario file"
+        )
+    );
+}
+
+#[test]
 fn keys_that_a_study_without_control_does_not_use_are_refused() {
     for (study, keys) in [
         ("admissible", "arm"),

@@ -45,11 +45,9 @@ impl StudyOptions for Options {
     type Outcome = LoopOutcome;
 
     fn study(&self) -> Result<LoopMargins, StudyError> {
-        self.overrides.refuse(&[
-            ("initial", "--tip"),
-            ("controller.reference", "--tip"),
-            ("controller.law", "--controller"),
-        ])?;
+        self.overrides
+            .refuse(&[("initial", "--tip"), ("controller.reference", "--tip")])?;
+        self.overrides.refuse_law()?;
         let study = LoopMargins {
             controllers: once(&self.controllers.controller),
             posture: self.posture.into(),
