@@ -27,7 +27,7 @@ pub struct BeltRows {
 
 impl Content for BeltRows {
     fn read(path: &str) -> Result<Self, String> {
-        let (_, points) = series::read(path, &COLUMNS)?;
+        let (_, points) = series::read(path, &COLUMNS, 2)?;
         let mut positions_m = vec![0.0];
         let mut position_m = 0.0;
         for pair in points.windows(2) {

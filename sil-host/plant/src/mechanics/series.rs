@@ -23,15 +23,24 @@ pub(crate) struct Columns {
 }
 
 /// Reads a file whose first line names one of the allowed pairs of columns; returns the index of this
-/// pair and at least two rows.
+/// pair and at least `least` rows.
 ///
 /// # Errors
 /// One sentence with the path, the line, the column and what is allowed.
-pub(crate) fn read(path: &str, allowed: &[Columns]) -> Result<(usize, Vec<(f64, f64)>), String> {
+pub(crate) fn read(
+    path: &str,
+    allowed: &[Columns],
+    least: usize,
+) -> Result<(usize, Vec<(f64, f64)>), String> {
     check_permitted(path)?;
     let text = input_file::read(Path::new(path))
         .map_err(|error| format!("cannot read {path}: {error}"))?;
-    parse(&text, allowed).map_err(|reason| format!("{path}: {reason}"))
+    let (pair, points) = parse(&text, allowed).map_err(|reason| format!("{path}: {reason}"))?;
+    if points.len() < least {
+        let rows = if least == 1 { "one row" } else { "two rows" };
+        return Err(format!("{path}: it needs at least {rows} of numbers"));
+    }
+    Ok((pair, points))
 }
 
 fn parse(text: &str, allowed: &[Columns]) -> Result<(usize, Vec<(f64, f64)>), String> {
@@ -91,9 +100,6 @@ fn parse(text: &str, allowed: &[Columns]) -> Result<(usize, Vec<(f64, f64)>), St
             return Err(format!("it has more than {MOST_ROWS} rows"));
         }
         points.push((place, value));
-    }
-    if points.len() < 2 {
-        return Err("it needs at least two rows of numbers".into());
     }
     Ok((pair, points))
 }

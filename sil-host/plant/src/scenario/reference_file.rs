@@ -33,7 +33,7 @@ pub(super) fn expand(scenario: &mut Table) -> Result<(), String> {
 }
 
 fn segments(path: &str) -> Result<Vec<Value>, String> {
-    let (_, rows) = series::read(path, &COLUMNS)?;
+    let (_, rows) = series::read(path, &COLUMNS, 1)?;
     if rows.len() > MAXIMUM_SEGMENTS {
         let count = rows.len();
         return Err(format!(
@@ -42,6 +42,10 @@ fn segments(path: &str) -> Result<Vec<Value>, String> {
     }
     if rows[0].0 < 0.0 {
         return Err(format!("{path}: the first time is negative"));
+    }
+    if rows.len() == 1 && rows[0].0 == 0.0 {
+        // It would be nothing but a jump.
+        return Err(format!("{path}: the time of its only row is not above 0"));
     }
     let mut before_s = 0.0;
     let segments = rows.into_iter().map(|(time_s, target_m)| {
@@ -80,6 +84,8 @@ mod tests {
         let expected = "[Step { target_m: -0.1, duration_s: 0.0 }, \
              Ramp { target_m: 0.05, duration_s: 1.5 }, Ramp { target_m: 0.05, duration_s: 0.5 }]";
         assert_eq!(segments, expected);
+        let one = load("time_s,target_m\n2,0.05\n").unwrap();
+        assert_eq!(one, "[Ramp { target_m: 0.05, duration_s: 2.0 }]");
     }
 
     #[test]
@@ -96,6 +102,11 @@ mod tests {
                 "line 3: target_m = 21 is outside the allowed range -20 to 20",
             ),
             ("time_s,target_m\n-1,0\n1,0\n".into(), "negative"),
+            (
+                "time_s,target_m\n0,0.05\n".into(),
+                "only row is not above 0",
+            ),
+            ("time_s,target_m\n".into(), "at least one row"),
             ("time_s,target\n0,0\n1,0\n".into(), "time_s,target_m"),
             (
                 format!("time_s,target_m\n{}", rows(17)),

@@ -36,7 +36,7 @@ pub struct FrictionRows {
 
 impl Content for FrictionRows {
     fn read(path: &str) -> Result<Self, String> {
-        let (columns, points) = series::read(path, &COLUMNS)?;
+        let (columns, points) = series::read(path, &COLUMNS, 2)?;
         Ok(Self {
             along_belt: columns == 1,
             points,
