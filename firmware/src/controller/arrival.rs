@@ -36,8 +36,8 @@ impl<L: Law> Controller<L> {
         let ahead = frame.sequence.wrapping_sub(last);
         let (encoders, forces) = self.estimates.can_read(frame);
         let mut reports = BOARD_LAPSES.iter().map(|(input, _)| *input);
-        let is_reported = reports.any(|input| frame.inputs.contains(input));
-        if ahead != 1 || !encoders || !forces || is_reported {
+        let reported = |input| frame.inputs.contains(input);
+        if ahead != 1 || !encoders || !forces || reports.any(reported) {
             return self.irregular(frame, ahead);
         }
         state.last_sequence = Some(frame.sequence);
