@@ -325,7 +325,17 @@ fn tell_usage(usage: &clap::Error) -> ExitCode {
         warn(format_args!("error: {mistake}"));
         return ExitCode::from(2);
     }
-    let written = usage.print().and_then(|()| std::io::stdout().flush());
+    let written = if terminal::is_ascii_only() {
+        let text = terminal::readable(usage.render());
+        if usage.use_stderr() {
+            warn(text.trim_end());
+            Ok(())
+        } else {
+            terminal::say(text.trim_end())
+        }
+    } else {
+        usage.print().and_then(|()| std::io::stdout().flush())
+    };
     match said(written) {
         Err(error) if !usage.use_stderr() => exit_code_of(&error),
         _ => u8::try_from(usage.exit_code()).unwrap_or(2).into(),

@@ -40,6 +40,22 @@ fn a_closed_pipe_is_not_an_error_but_a_full_disk_is() {
 }
 
 #[test]
+fn help_and_usage_are_ascii_where_the_locale_asks_for_it() {
+    let bench = Bench::new("ascii");
+    for (arguments, expected) in [
+        (["commission", "--torque-limit-nm=nan"], 2),
+        (["commission", "--help"], 0),
+    ] {
+        let mut command = bench.command(&arguments);
+        let output = command.env("LC_ALL", "C").output().unwrap();
+        assert_eq!(code(output.status), expected, "{output:?}");
+        assert!(output.stdout.is_ascii(), "{output:?}");
+        assert!(output.stderr.is_ascii(), "{output:?}");
+        assert!(output.stdout.len() + output.stderr.len() > 60, "{output:?}");
+    }
+}
+
+#[test]
 fn signals_are_handled_while_a_process_waits_for_its_peer() {
     let interrupted = |role: &str, sent: Signal| {
         let bench = Bench::new(&format!("waiting-{role}-{sent}"));
