@@ -93,6 +93,8 @@ use crate::torque_output::TorqueOutput;
 /// assert_eq!(answer.torques.map(|torque| torque.0), [0, 0]);
 /// # Ok::<(), painleve_shared::range::OutOfRange>(())
 /// ```
+// In this order: a Cortex-M4F loads floats only from the first kilobyte after a pointer. What a tick needs less of comes
+// last.
 #[derive(Clone, Debug)]
 #[repr(C)]
 pub struct Controller<L: Law = LawSettings> {
