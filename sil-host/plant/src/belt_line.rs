@@ -91,8 +91,8 @@ impl<'a> BeltLine<'a> {
         }
     }
 
-    /// Returns how far a tip is before the edge p = 0 that is next in a direction along the belt, +1 or −1, m; negative if
-    /// the tip is beyond it. `None` if p is positive from the tip as far as the arm reaches, or if p/Q22 falls and rises
+    /// Returns how far a tip is before the edge p = 0 that is next along the belt in the direction of this sign, m; negative
+    /// if the tip is beyond it. `None` if p is positive from the tip as far as the arm reaches, or if p/Q22 falls and rises
     /// again before the edge: a tip that is held there is held by its least value.
     pub fn before_edge_m(
         &self,
@@ -101,15 +101,16 @@ impl<'a> BeltLine<'a> {
         friction: f64,
         slip: Slip,
     ) -> Option<f64> {
+        let sign = direction.signum();
         let mut stretches = positive_stretches(|tau| self.p_per_kg(tau, friction, slip));
-        if direction < 0.0 {
+        if sign < 0.0 {
             stretches = stretches
                 .into_iter()
                 .rev()
                 .map(|(from, to)| (-to, -from))
                 .collect();
         }
-        let tip = direction.signum() * tip_t_m;
+        let tip = sign * tip_t_m;
         // A tip where p is not positive has left the stretch behind it.
         let (_, end) = stretches
             .into_iter()
@@ -123,7 +124,7 @@ impl<'a> BeltLine<'a> {
             let start = self.tau(tip)?;
             let p_ratio = |number: usize| {
                 let tau = start + (end - start) * (number as f64 / POINTS_TO_EDGE as f64);
-                self.p_ratio(direction.signum() * tau, friction, slip)
+                self.p_ratio(sign * tau, friction, slip)
             };
             let (mut last, mut falls) = (p_ratio(0), false);
             for next in (1..=POINTS_TO_EDGE).map(p_ratio) {
@@ -333,6 +334,7 @@ mod tests {
         assert!((tau - 0.1234).abs() < 1e-7 && value == 2.0, "{tau} {value}");
         assert_eq!(least(|t| t).tau, -core::f64::consts::FRAC_PI_2);
     }
+
     #[test]
     fn the_edge_is_the_one_ahead_of_the_tip_up_to_the_full_reach() {
         let arm = Arm::new(ArmParameters::default()).unwrap();

@@ -1,6 +1,6 @@
 //! How far a tip on the belt is from the paradox: p/Q22, and the distance to the place where p = 0.
 
-use painleve_plant::belt_line::BeltLine;
+use painleve_plant::belt_line::{BeltLine, bisected};
 use painleve_plant::nalgebra::Matrix2;
 use painleve_plant::scenario::Scenario;
 use painleve_shared::{Arm, LinkMotion, OutOfRange, Pose, Posture, Slip};
@@ -83,8 +83,8 @@ impl ParadoxDistance {
     }
 
     /// Returns how far a tip that is held back at link angles (rad), with p in 1/kg, is before the edge p = 0 that is next
-    /// in the direction in which it is held, +1 or −1, m; 0 inside the paradox. `None` if there is no such edge: the tip is
-    /// held by another limit.
+    /// in the direction of this sign, m; 0 inside the paradox. `None` if there is no such edge: the tip is held by another
+    /// limit.
     pub fn before_edge_m(
         &self,
         theta: &LinkMotion<f64>,
@@ -109,21 +109,12 @@ impl ParadoxDistance {
         };
         let at = |number: usize| reach_m * (2.0 * number as f64 / INTERVALS as f64 - 1.0);
         let crossing = |number: usize| {
-            let (mut low, mut high) = (at(number), at(number + 1));
+            let (low, high) = (at(number), at(number + 1));
             let sign = p(low).signum();
             if sign * p(high) > 0.0 || p(high).is_nan() {
                 return None;
             }
-            // 60 halvings of 3 mm are below rounding.
-            for _ in 0..60 {
-                let middle = 0.5 * (low + high);
-                if sign * p(middle) > 0.0 {
-                    low = middle;
-                } else {
-                    high = middle;
-                }
-            }
-            Some(0.5 * (low + high))
+            Some(bisected(low, high, |tip_m| sign * p(tip_m) > 0.0))
         };
         (0..INTERVALS).filter_map(crossing).collect()
     }

@@ -350,7 +350,7 @@ fn to_edge_m(scenario: &Scenario, result: &LoopResult) -> Option<f64> {
     if !result.at_edge {
         return None;
     }
-    let direction = (scenario.target_m()? - result.final_reference_m).signum();
+    let direction = scenario.target_m()? - result.final_reference_m;
     ParadoxDistance::new(scenario).ok()?.before_edge_m(
         &result.final_theta_rad,
         result.final_p_per_kg,

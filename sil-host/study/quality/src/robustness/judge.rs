@@ -104,7 +104,7 @@ pub fn run<P: Plant>(
     let to_edge_m = target_m.filter(|_| at_edge).and_then(|target_m| {
         let held_m = target_m - trial.answer().reference_tip.to_metres();
         let line = BeltLine::new(&arm, posture);
-        line.before_edge_m(tip_t_m, held_m.signum(), friction, slip)
+        line.before_edge_m(tip_t_m, held_m, friction, slip)
     });
     let captured = contact
         .captured_s
