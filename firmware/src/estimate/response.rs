@@ -267,7 +267,8 @@ impl ResponseEstimator {
         if self.turns < LEAST_TURNS {
             return;
         }
-        let [first, second] = [0, 1].map(|order| self.averages[order].response(self.spread));
+        let averages = self.averages.each_ref();
+        let [first, second] = averages.map(|it| it.response(self.spread));
         self.width = 2.0 * DEVIATIONS * first.deviation;
         self.gain = (first.response - DEVIATIONS * first.deviation) / RIGID;
         let upper = first.response + DEVIATIONS * first.deviation;

@@ -326,12 +326,12 @@ fn tell_usage(usage: &clap::Error) -> ExitCode {
         return ExitCode::from(2);
     }
     let written = if terminal::is_ascii_only() {
-        let text = terminal::readable(usage.render());
+        let text = usage.render().to_string();
         if usage.use_stderr() {
             warn(text.trim_end());
             Ok(())
         } else {
-            terminal::say(text.trim_end())
+            terminal::say(terminal::readable(text.trim_end()))
         }
     } else {
         usage.print().and_then(|()| std::io::stdout().flush())
