@@ -12,6 +12,7 @@
 //! - [`passes`]: slides as means over short stretches
 //! - [`fit`]: nonlinear least squares with that prior knowledge, and the covariance
 //! - [`verdict`]: reasons to refuse a result, and the motion that is missing
+//! - [`forces`]: friction of the tip and ripple of its normal force
 //! - [`torques`]: friction and springs of the joints, and gains of their stages, once the geometry is known
 //!
 //! Parameters are strongly correlated: a zero and the cosine of its encoder's error differ little over a part of a
@@ -19,6 +20,7 @@
 //! ([`Identified::tip_deviation_m`]).
 
 pub mod fit;
+pub mod forces;
 pub mod geometry;
 pub mod parameters;
 pub mod passes;
@@ -133,6 +135,8 @@ pub struct Limits {
     pub tip_deviation_m: f64,
     /// Largest distance of the tip from a line, root mean square, m, apart from what rounding adds.
     pub off_line_m: f64,
+    /// Speed of a tip along the belt, in its direction, from which the belt carries it, m/s.
+    pub carried_m_s: f64,
     /// Largest torque that is commanded to a joint, N·m.
     pub torque_limit_nm: f64,
 }
@@ -148,13 +152,14 @@ impl Limits {
 }
 
 impl Default for Limits {
-    /// For encoders of 14 bits, and a drive that knows no limit.
+    /// For encoders of 14 bits, a tip that the belt never carries, and a drive that knows no limit.
     fn default() -> Self {
         Self {
             count_rad: core::f64::consts::TAU / 16384.0,
             contact_n: 0.5,
             tip_deviation_m: 0.5e-3,
             off_line_m: 0.15e-3,
+            carried_m_s: f64::INFINITY,
             torque_limit_nm: f64::INFINITY,
         }
     }
