@@ -14,8 +14,9 @@ use painleve_study_quality::distribution::Percentiles;
 use painleve_study_quality::proportion::Proportion;
 use painleve_study_quality::robustness;
 
+use super::campaigns::{SURE_TORQUE, describe, loops};
 use super::mujoco_arm::{MujocoArm, python};
-use super::{SURE_TORQUE, describe, identified_on, loops, within_deviations};
+use super::{identified_on, within_deviations};
 
 const FIRST_SEED: u64 = 7_004_000;
 
