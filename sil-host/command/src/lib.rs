@@ -256,6 +256,7 @@ impl CommandError {
                 | StudyError::NothingAdmissible
                 | StudyError::Range(_)
                 | StudyError::LevelsOfSeveralEffects
+                | StudyError::SeveralFrictions { .. }
                 | StudyError::TooManyRows(_) => 2,
             },
             Self::Sweep(SweepError::Incomplete { .. } | SweepError::Mismatch(_)) => 1,

@@ -16,7 +16,7 @@ mod table;
 mod words;
 
 use painleve_firmware::configuration::ControllerSettings;
-use painleve_shared::{ArmParameters, OutOfRange, settings};
+use painleve_shared::{ArmParameters, OutOfRange, Slip, settings};
 use serde::Deserialize;
 use serde_path_to_error::{Deserializer, Path, Track};
 use toml::{Table, Value};
@@ -109,6 +109,11 @@ impl Scenario {
             impact: self.impact,
             solver: self.solver,
         }
+    }
+
+    /// Returns the direction in which a resting tip slips at the start.
+    pub fn slip_at_rest(&self) -> Slip {
+        Slip::of(-self.belt.profile.speed_m_s(0.0))
     }
 
     /// Returns the arm as it moves: with the rotors of its elastic gears, which follow the joints below the gears'

@@ -8,7 +8,7 @@ use std::str::FromStr;
 use painleve_firmware::refer::reference::{Program, Segment};
 use painleve_plant::converters::ConverterSettings;
 use painleve_plant::scenario::{InitialState, RunSettings, Scenario};
-use painleve_shared::{Arm, ArmParameters, Posture};
+use painleve_shared::{Arm, ArmParameters, Posture, Slip};
 use serde::{Serialize, Serializer};
 
 use crate::StudyError;
@@ -38,6 +38,15 @@ impl ControllerChoice {
         Self::HybridPaperModel,
         Self::Hybrid,
     ];
+
+    /// Returns its scenario, for no posture in particular.
+    ///
+    /// # Errors
+    /// [`StudyError`] naming the controller if the scenario does not exist or a key is wrong.
+    pub(crate) fn load_unplaced(&self) -> Result<Scenario, StudyError> {
+        let (name, _) = self.source(Posture::ElbowDown);
+        Ok(Scenario::load_unplaced(name, &[])?)
+    }
 
     /// Returns the built-in scenario or file for a posture, and the overrides to apply to it.
     fn source(&self, posture: Posture) -> (&str, &'static [&'static str]) {
@@ -187,16 +196,24 @@ impl Serialize for Reference {
 /// z_t of the paper's x0,d and x0,u as a fraction of the reach: −0.1624 m of 0.1841 m.
 const START: f64 = -0.882;
 
-/// Returns the initial state of a closed loop in a posture: the paper's x0,d or x0,u; for an
-/// arm of another shape, at rest on the belt at the same fraction of its reach.
+/// Returns the initial state of a closed loop in a posture, far from the edge that a tip meets with this slip: the paper's
+/// x0,d or x0,u; for an arm of another shape or the other slip, at rest on the belt at the same fraction of its reach.
 ///
 /// # Errors
 /// [`StudyError::Range`] if the arm is out of range.
-pub fn start(arm: &ArmParameters<f64>, posture: Posture) -> Result<InitialState, StudyError> {
+pub fn start(
+    arm: &ArmParameters<f64>,
+    posture: Posture,
+    slip: Slip,
+) -> Result<InitialState, StudyError> {
     let of_paper = ArmParameters::<f64>::default();
-    if arm.link_length_m != of_paper.link_length_m || arm.height_m != of_paper.height_m {
+    let is_of_paper = arm.link_length_m == of_paper.link_length_m
+        && arm.height_m == of_paper.height_m
+        && slip == Slip::Positive;
+    if !is_of_paper {
         let arm = Arm::new(*arm)?;
-        return at_rest_on_belt(&arm, START * arm.reach_on_belt_m(), posture);
+        let start_m = START * slip.sign::<f64>() * arm.reach_on_belt_m();
+        return at_rest_on_belt(&arm, start_m, posture);
     }
     let [theta_1, theta_2] = InitialState::X0_D_DEG;
     Ok(match posture {
@@ -271,7 +288,7 @@ pub fn scenario(
         );
         scenario = scenario.with_overrides(&origin, &[model])?;
     }
-    scenario.initial = start(&scenario.arm, posture)?;
+    scenario.initial = start(&scenario.arm, posture, scenario.slip_at_rest())?;
     Ok(scenario)
 }
 

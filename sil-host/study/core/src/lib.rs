@@ -66,6 +66,14 @@ pub enum StudyError {
         /// Its setting.
         setting: &'static str,
     },
+    /// The scenarios have several friction coefficients.
+    #[error(
+        "the controllers' scenarios differ in belt.friction ({mu:?}); say with --mu which to study"
+    )]
+    SeveralFrictions {
+        /// Those of successive scenarios.
+        mu: Vec<f64>,
+    },
     /// Levels without exactly one effect whose levels they are.
     #[error("--level needs exactly one effect other than none in --effect")]
     LevelsOfSeveralEffects,

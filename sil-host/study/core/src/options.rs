@@ -166,14 +166,37 @@ impl RandomRuns {
 /// Friction coefficients of a study.
 #[derive(Clone, Debug, Args)]
 pub struct FrictionGrid {
-    /// Friction coefficients μ, FROM:TO:STEP or a list.
-    #[arg(
-        long,
-        value_name = "GRID",
-        default_value = "0.6",
-        allow_hyphen_values = true
-    )]
-    pub mu: Grid,
+    /// Friction coefficients μ, FROM:TO:STEP or a list; the scenario's by default.
+    #[arg(long, value_name = "GRID", allow_hyphen_values = true)]
+    mu: Option<Grid>,
+}
+
+impl FrictionGrid {
+    /// Returns the friction coefficients, by default that of the scenario.
+    pub fn of(&self, scenario: &Scenario) -> Vec<f64> {
+        let of_scenario = || vec![scenario.belt.friction];
+        let grid = self.mu.as_ref();
+        grid.map_or_else(of_scenario, |grid| grid.values().to_vec())
+    }
+
+    /// Returns the friction coefficients, by default that of all the controllers' scenarios.
+    ///
+    /// # Errors
+    /// [`StudyError`] if a scenario cannot be loaded, or if they differ.
+    pub fn of_controllers(&self, controllers: &[ControllerChoice]) -> Result<Vec<f64>, StudyError> {
+        if let Some(grid) = &self.mu {
+            return Ok(grid.values().to_vec());
+        }
+        let mut mu: Vec<f64> = Vec::new();
+        for controller in controllers {
+            mu.push(controller.load_unplaced()?.belt.friction);
+        }
+        mu.dedup();
+        match mu[..] {
+            [_] => Ok(mu),
+            _ => Err(StudyError::SeveralFrictions { mu }),
+        }
+    }
 }
 
 /// Belt speeds of a study.
@@ -344,6 +367,39 @@ mod tests {
         }
         let other = load("belt={profile={kind='constant',speed_m_s=-0.7}}").unwrap();
         assert_eq!(other.belt.profile.speed_m_s(0.0), -0.7);
+    }
+
+    #[test]
+    fn friction_is_that_of_the_scenario_unless_an_option_says_another() {
+        let path =
+            std::env::temp_dir().join(format!("painleve-friction-{}.toml", std::process::id()));
+        std::fs::write(&path, "[belt]\nfriction = 0.8\n").unwrap();
+        let own = ControllerChoice::Scenario(path.to_string_lossy().into());
+        let (told, default) = (
+            FrictionGrid {
+                mu: Some(Grid::of(0.3)),
+            },
+            FrictionGrid { mu: None },
+        );
+        let of = |grid: &FrictionGrid, controllers: &[ControllerChoice]| {
+            grid.of_controllers(controllers)
+                .map_err(|error| error.to_string())
+        };
+        let both = [ControllerChoice::Hybrid, own.clone()];
+        assert_eq!(of(&default, &[own]), Ok(vec![0.8]));
+        assert_eq!(of(&default, &ControllerChoice::ALL), Ok(vec![0.6]));
+        assert_eq!(of(&told, &both), Ok(vec![0.3]));
+        let message = of(&default, &both).unwrap_err();
+        assert!(
+            message.contains("[0.6, 0.8]") && message.contains("--mu"),
+            "{message}"
+        );
+        let scenario = Scenario::load_unplaced(&path.to_string_lossy(), &[]).unwrap();
+        assert_eq!(
+            (default.of(&scenario), told.of(&scenario)),
+            (vec![0.8], vec![0.3])
+        );
+        std::fs::remove_file(path).unwrap();
     }
 
     #[test]

@@ -46,7 +46,7 @@ impl CellOptions {
         let cells = Cells {
             plant: scenario.plant_parameters(),
             relative_tolerance: self.relative_tolerance.unwrap_or(RELATIVE_TOLERANCE),
-            mu: self.friction.mu.values().to_vec(),
+            mu: self.friction.of(&scenario),
             v_belt_m_s: self.belt.v_belt.values().to_vec(),
             initial: self.initial.initial.list().to_vec(),
             seed: self.initial.seed,

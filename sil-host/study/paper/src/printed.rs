@@ -3,7 +3,7 @@
 
 use painleve_plant::mechanics::belt::BeltProfile;
 use painleve_plant::scenario::Scenario;
-use painleve_shared::{ArmParameters, Posture};
+use painleve_shared::{ArmParameters, Posture, Slip};
 use painleve_study_core::case::ControllerChoice;
 use painleve_study_core::initial::Initial;
 
@@ -14,12 +14,18 @@ pub const FRICTION: f64 = 0.6;
 pub const BOUNCING_M_S: [f64; 2] = [-0.575, -0.3];
 
 /// Table II: the interval of z_t with p > 0, m.
-pub fn admissible_m(arm: &ArmParameters<f64>, mu: f64, posture: Posture) -> Option<[f64; 2]> {
+pub fn admissible_m(
+    arm: &ArmParameters<f64>,
+    mu: f64,
+    posture: Posture,
+    slip: Slip,
+) -> Option<[f64; 2]> {
     let upper = match posture {
         Posture::ElbowUp => 0.183,
         Posture::ElbowDown => 0.168,
     };
-    (*arm == ArmParameters::default() && mu == FRICTION).then_some([-0.184, upper])
+    let of_paper = *arm == ArmParameters::default() && mu == FRICTION && slip == Slip::Positive;
+    of_paper.then_some([-0.184, upper])
 }
 
 /// Smallest friction coefficient with bouncing in the paper's bifurcation diagram.

@@ -9,7 +9,7 @@ use painleve_plant::mechanics::BuiltInPlant;
 use painleve_plant::mechanics::motion::theta;
 use painleve_plant::scenario::{InitialState, Scenario};
 use painleve_plant::{Plant, Snapshot};
-use painleve_shared::{Arm, GeneralisedTorque, JointTorque, LinkMotion, Pose, Slip};
+use painleve_shared::{Arm, GeneralisedTorque, JointTorque, LinkMotion, Pose};
 use painleve_study_quality::distribution::Percentiles;
 use painleve_study_quality::proportion::Proportion;
 use painleve_study_quality::robustness;
@@ -134,7 +134,7 @@ impl Torques {
         let arm = Arm::new(scenario.arm).unwrap();
         let start = theta(&scenario.initial.state(&scenario.arm).unwrap());
         let pose = Pose::new(&start);
-        let slip = Slip::of(-scenario.belt.profile.speed_m_s(0.0));
+        let slip = scenario.slip_at_rest();
         let friction_n = -scenario.belt.friction * slip.sign::<f64>() * self.force_n;
         let load_nm = arm.passive_torque_nm(&start, &LinkMotion::zeros(), &pose);
         let held_nm = arm.jacobian(&pose).transpose() * Vector2::new(friction_n, self.force_n);

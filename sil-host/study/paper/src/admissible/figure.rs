@@ -3,7 +3,7 @@
 use painleve_chart::style::{BLUE_INK, GREY, VERMILLION};
 use painleve_chart::{Chart, Mark, Panel};
 use painleve_plant::belt_line::BeltLine;
-use painleve_shared::{Arm, Slip};
+use painleve_shared::Arm;
 use painleve_study_core::outcome::Figure;
 
 use super::Admissible;
@@ -22,10 +22,7 @@ impl Figure for Admissible {
                 let line = BeltLine::new(&arm, posture);
                 let points = (0..=CURVE_POINTS).map(|index| {
                     let tau = core::f64::consts::PI * (index as f64 / CURVE_POINTS as f64 - 0.5);
-                    (
-                        line.tip_t_m(tau),
-                        line.p_per_kg(tau, self.mu, Slip::Positive),
-                    )
+                    (line.tip_t_m(tau), line.p_per_kg(tau, self.mu, self.slip))
                 });
                 marks.push(Mark::line(name, colour, points.collect()));
             }
@@ -35,8 +32,10 @@ impl Figure for Admissible {
         Chart {
             title: "Admissible configurations (Table II)".into(),
             subtitle: format!(
-                "μ = {} · slip żᵣ > 0 · critical friction {:.5}",
-                self.mu, self.critical_friction
+                "μ = {} · slip {} · critical friction {:.5}",
+                self.mu,
+                self.direction(),
+                self.critical_friction
             ),
             x_title: "Tip position zₜ (m)".into(),
             x: Some(low..high),

@@ -16,11 +16,13 @@ use crate::printed;
 
 pub use options::Options;
 
-/// The admissible tip positions (p > 0) at one friction coefficient, with slip ż_r > 0.
+/// The admissible tip positions (p > 0) at one friction coefficient, in one direction of slip.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Admissible {
     /// Friction coefficient μ.
     pub mu: f64,
+    /// Direction of slip.
+    pub slip: Slip,
     /// Smallest friction coefficient with which p = 0 somewhere on the belt.
     pub critical_friction: f64,
     /// Tip position at which this happens, m.
@@ -67,6 +69,8 @@ pub struct AdmissibleStudy {
     pub arm: ArmParameters<f64>,
     /// Friction coefficient μ.
     pub mu: f64,
+    /// Direction of slip.
+    pub slip: Slip,
 }
 
 /// The single row of the study.
@@ -78,20 +82,24 @@ impl Study for AdmissibleStudy {
     }
 
     fn row(&self, _: usize) -> Result<Admissible, StudyError> {
-        admissible(&self.arm, self.mu)
+        admissible(&self.arm, self.mu, self.slip)
     }
 }
 
-/// Computes the admissible intervals of an arm at one friction coefficient.
+/// Computes the admissible intervals of an arm at one friction coefficient, in one direction of slip.
 ///
 /// # Errors
 /// [`StudyError::Range`] if the arm or the friction coefficient is out of range.
-pub fn admissible(parameters: &ArmParameters<f64>, mu: f64) -> Result<Admissible, StudyError> {
+pub fn admissible(
+    parameters: &ArmParameters<f64>,
+    mu: f64,
+    slip: Slip,
+) -> Result<Admissible, StudyError> {
     range::check("--mu", mu, 0.0, 10.0)?;
     let arm = Arm::new(*parameters)?;
     let critical = |posture| {
         let line = BeltLine::new(&arm, posture);
-        let least = least(|tau| line.friction_of_zero_p(tau, Slip::Positive));
+        let least = least(|tau| line.friction_of_zero_p(tau, slip));
         (least.value, line.tip_t_m(least.tau), posture)
     };
     let (up, down) = (critical(Posture::ElbowUp), critical(Posture::ElbowDown));
@@ -99,12 +107,13 @@ pub fn admissible(parameters: &ArmParameters<f64>, mu: f64) -> Result<Admissible
         if up.0 < down.0 { up } else { down };
     Ok(Admissible {
         mu,
+        slip,
         critical_friction,
         critical_tip_t_m,
         critical_posture,
         reach_m: arm.reach_on_belt_m(),
-        elbow_up: intervals(parameters, &arm, Posture::ElbowUp, mu),
-        elbow_down: intervals(parameters, &arm, Posture::ElbowDown, mu),
+        elbow_up: intervals(parameters, &arm, Posture::ElbowUp, mu, slip),
+        elbow_down: intervals(parameters, &arm, Posture::ElbowDown, mu, slip),
         arm: *parameters,
     })
 }
@@ -114,16 +123,17 @@ fn intervals(
     arm: &Arm<f64>,
     posture: Posture,
     mu: f64,
+    slip: Slip,
 ) -> Intervals {
     let line = BeltLine::new(arm, posture);
     let at = |mu: f64| -> Vec<[f64; 2]> {
-        positive_stretches(|tau| line.p_per_kg(tau, mu, Slip::Positive))
+        positive_stretches(|tau| line.p_per_kg(tau, mu, slip))
             .into_iter()
             .map(|(from, to)| [line.tip_t_m(from), line.tip_t_m(to)])
             .collect()
     };
     let intervals_m = at(mu);
-    let paper_m = printed::admissible_m(parameters, mu, posture);
+    let paper_m = printed::admissible_m(parameters, mu, posture, slip);
     let upper = paper_m.map(|[_, upper]| upper);
     let fits = |upper: f64| {
         (1..=10).find_map(|tenths| {
@@ -147,7 +157,7 @@ mod tests {
     use super::*;
 
     fn at(mu: f64) -> Admissible {
-        admissible(&ArmParameters::default(), mu).unwrap()
+        admissible(&ArmParameters::default(), mu, Slip::Positive).unwrap()
     }
 
     #[test]
@@ -176,6 +186,20 @@ mod tests {
         assert_eq!(ours.elbow_down.paper_fits.unwrap().mu, 0.5);
         assert_eq!(ours.elbow_up.paper_fits.unwrap().mu, 0.6);
         assert!((ours.elbow_down.difference_m.unwrap() + 0.003_29).abs() < 1e-5);
+    }
+
+    #[test]
+    fn the_other_slip_is_the_mirror_image_in_the_other_posture() {
+        let ours = at(0.6);
+        let other = admissible(&ArmParameters::default(), 0.6, Slip::Negative).unwrap();
+        let [[from, to]] = other.elbow_up.intervals_m[..] else {
+            panic!("{other:?}");
+        };
+        let [[mirrored_to, mirrored_from]] = ours.elbow_down.intervals_m[..] else {
+            panic!("{ours:?}");
+        };
+        assert!((from + mirrored_from).abs() < 1e-9 && (to + mirrored_to).abs() < 1e-9);
+        assert_eq!(other.elbow_up.paper_m, None);
     }
 
     #[test]
@@ -213,7 +237,7 @@ mod tests {
     #[test]
     fn friction_out_of_range_is_refused_by_name() {
         for mu in [f64::NAN, -0.1, 11.0] {
-            let error = admissible(&ArmParameters::default(), mu).unwrap_err();
+            let error = admissible(&ArmParameters::default(), mu, Slip::Positive).unwrap_err();
             assert!(error.to_string().starts_with("--mu = "), "{error}");
         }
     }

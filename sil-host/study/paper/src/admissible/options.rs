@@ -7,14 +7,13 @@ use painleve_study_core::figures::page_maker::PageMaker;
 use painleve_study_core::options::BaseOptions;
 
 use super::{Admissible, AdmissibleStudy, page};
-use crate::printed;
 
 /// Table II: tip positions at which p > 0, and the critical friction.
 #[derive(Debug, Args)]
 pub struct Options {
-    /// Friction coefficient μ.
-    #[arg(long, default_value_t = printed::FRICTION)]
-    mu: f64,
+    /// Friction coefficient μ; the scenario's by default.
+    #[arg(long)]
+    mu: Option<f64>,
     #[command(flatten)]
     base: BaseOptions,
 }
@@ -27,10 +26,11 @@ impl StudyOptions for Options {
     fn study(&self) -> Result<AdmissibleStudy, StudyError> {
         let scenario = self
             .base
-            .load_rigid(&[("belt.friction", "--mu")], &["arm"])?;
+            .load_rigid(&[("belt.friction", "--mu")], &["arm", "belt"])?;
         Ok(AdmissibleStudy {
             arm: scenario.arm,
-            mu: self.mu,
+            slip: scenario.slip_at_rest(),
+            mu: self.mu.unwrap_or(scenario.belt.friction),
         })
     }
 

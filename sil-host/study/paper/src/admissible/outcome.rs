@@ -1,7 +1,7 @@
 //! Table of the intervals, with the paper's for comparison.
 
 use comfy_table::Table;
-use painleve_shared::Posture;
+use painleve_shared::{Posture, Slip};
 use painleve_study_core::outcome::{self, Outcome};
 use serde::Serialize;
 
@@ -12,6 +12,7 @@ use crate::printed;
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct IntervalLine {
     mu: f64,
+    slip: Slip,
     posture: Posture,
     from_m: f64,
     to_m: f64,
@@ -22,6 +23,14 @@ pub struct IntervalLine {
 }
 
 impl Admissible {
+    /// Returns the direction of slip, as the paper writes it.
+    pub(super) fn direction(&self) -> &'static str {
+        match self.slip {
+            Slip::Positive => "żᵣ > 0",
+            Slip::Negative => "żᵣ < 0",
+        }
+    }
+
     pub(super) fn postures(&self) -> [(Posture, &'static str, &Intervals); 2] {
         [
             (Posture::ElbowUp, "elbow up", &self.elbow_up),
@@ -37,6 +46,7 @@ impl Outcome for Admissible {
             for &[from_m, to_m] in &intervals.intervals_m {
                 lines.push(IntervalLine {
                     mu: self.mu,
+                    slip: self.slip,
                     posture,
                     from_m,
                     to_m,
@@ -52,7 +62,7 @@ impl Outcome for Admissible {
 
     fn table(&self) -> Table {
         let mut table = outcome::table([
-            format!("μ = {}", self.mu),
+            format!("μ = {}, {}", self.mu, self.direction()),
             "p > 0 for zₜ (m)".into(),
             "the paper".into(),
             "upper end, ours − paper".into(),

@@ -1,6 +1,7 @@
 //! Table II on the page of figures.
 
 use painleve_plant::mechanics::PlantParameters;
+use painleve_shared::Slip;
 use painleve_study_core::catalogue::PageSection;
 use painleve_study_core::figures::page::{Comparison, Section};
 use painleve_study_core::figures::page_maker::{PageMaker, section};
@@ -17,6 +18,7 @@ pub fn sections(_: &PageMaker<'_>) -> Result<Vec<PageSection>, StudyError> {
     let study = AdmissibleStudy {
         arm: PlantParameters::default().arm,
         mu: printed::FRICTION,
+        slip: Slip::Positive,
     };
     let outcome = study.row(0)?;
     Ok(vec![(table_2(&outcome), Box::new(outcome))])

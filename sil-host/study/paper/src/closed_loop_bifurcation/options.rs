@@ -63,7 +63,7 @@ impl StudyOptions for Options {
         let study = ClosedLoopBifurcation {
             controllers: once(&self.controllers.controller),
             converters: once(&self.converters.converters),
-            mu: self.friction.mu.values().to_vec(),
+            mu: self.friction.of_controllers(&self.controllers.controller)?,
             v_belt_m_s: self.belt.v_belt.values().to_vec(),
             initial: self.initial.initial.list().to_vec(),
             seed: self.initial.seed,

@@ -9,7 +9,6 @@ use painleve_study_core::options::BaseOptions;
 use painleve_study_core::{Grid, StudyError};
 
 use super::{Map, Regions, RegionsStudy, Theta2, page};
-use crate::printed;
 
 /// A slip direction on the command line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -23,9 +22,9 @@ enum SlipOption {
 /// Fig. 3: solution modes over θ1 and its rate, with the tip on the belt.
 #[derive(Debug, Args)]
 pub struct Options {
-    /// Friction coefficient μ.
-    #[arg(long, default_value_t = printed::FRICTION)]
-    mu: f64,
+    /// Friction coefficient μ; the scenario's by default.
+    #[arg(long)]
+    mu: Option<f64>,
     /// θ1 in degrees, FROM:TO:STEP or a list; values that do not reach the belt are discarded.
     #[arg(
         long,
@@ -79,7 +78,7 @@ impl StudyOptions for Options {
         });
         let settings = RegionsStudy {
             arm: scenario.arm,
-            mu: self.mu,
+            mu: self.mu.unwrap_or(scenario.belt.friction),
             theta1_deg: self.theta1_deg.clone(),
             theta1_dot_rad_s: self.theta1_dot_rad_s.clone(),
             theta2: once(&self.theta2),

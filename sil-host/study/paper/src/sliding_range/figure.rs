@@ -15,7 +15,7 @@ impl Figure for SlidingRanges {
         let far = self
             .rows
             .iter()
-            .fold(0.19, |far: f64, row| far.max(row.limit_m + 0.005));
+            .fold(0.19, |far: f64, row| far.max(row.limit_m.abs() + 0.005));
         let varies: Vec<bool> = (0..Row::PARTS)
             .map(|part| {
                 let pairs = self.rows.windows(2);

@@ -2,7 +2,7 @@
 //! tolerance without leaving the belt (the paper's Z_t,sliding).
 //!
 //! Success need not be monotone in the target. All targets on a coarse grid from the start to
-//! the limit p = 0 are tried first. The range ends between the last target before
+//! the limit, p = 0 or the end of the reach, are tried first. The range ends between the last target before
 //! the first failure and that failure, where it is bisected. Targets reached
 //! beyond the first failure are not part of the range; they are reported as
 //! [`Row::reached_beyond_m`].
@@ -84,6 +84,8 @@ pub struct SlidingRange {
 pub enum RangeEnd {
     /// The limit p = 0 is reached.
     Limit,
+    /// The end of the arm's reach on the belt is reached, where p > 0.
+    Reach,
     /// The tip left the belt.
     LiftOff,
     /// The tip came to rest elsewhere, or too late.
@@ -96,6 +98,7 @@ impl RangeEnd {
     fn name(self) -> &'static str {
         match self {
             Self::Limit => "p = 0",
+            Self::Reach => "end of reach",
             Self::LiftOff => "lift-off",
             Self::NotReached => "stops short or late",
             Self::Fault => "fault",
@@ -120,7 +123,7 @@ pub struct Row {
     pub start_m: f64,
     /// Z_t,sliding, m; null if the first target fails.
     pub z_sliding_m: Option<f64>,
-    /// Tip position at which p = 0 in this posture, m.
+    /// Tip position at which p = 0 in this posture, or else the end of the reach, m.
     pub limit_m: f64,
     /// The paper's Z_t,sliding for this law, posture and μ, m; null if it gives none.
     pub paper_m: Option<f64>,
@@ -222,7 +225,7 @@ struct Case<'a> {
 impl Case<'_> {
     fn row(&self, plants: &impl MakePlant) -> Result<Row, StudyError> {
         let start_m = Trial::on(plants.make(&self.scenario)?, &self.scenario)?.tip_t_m();
-        let limit_m = self.limit_m(start_m)?;
+        let (limit_m, limit) = self.limit_m(start_m)?;
         let targets = self.targets(start_m, limit_m);
         let trials: Vec<Result<Trialled, StudyError>> = targets
             .par_iter()
@@ -242,7 +245,7 @@ impl Case<'_> {
             }
         }
         while let (Some((near, _)), Some((far, _))) = (reached, failed)
-            && far - near > self.criterion.resolution_m
+            && (far - near).abs() > self.criterion.resolution_m
         {
             let middle = 0.5 * (near + far);
             match self.run(middle, plants)? {
@@ -261,35 +264,48 @@ impl Case<'_> {
             limit_m,
             paper_m: printed::sliding_m(&self.scenario, self.controller, self.posture).flatten(),
             tip_t_m: reached.map(|(_, tip_t_m)| tip_t_m),
-            ends_by: failed.map_or(RangeEnd::Limit, |(_, ending)| ending),
+            ends_by: failed.map_or(limit, |(_, ending)| ending),
             reached_beyond_m,
         })
     }
 
-    /// Returns the end of the interval with p > 0 around the start.
-    fn limit_m(&self, start_m: f64) -> Result<f64, StudyError> {
+    /// Returns the end of the interval with p > 0 ahead of the start, m, and what it is.
+    fn limit_m(&self, start_m: f64) -> Result<(f64, RangeEnd), StudyError> {
         let arm = Arm::new(self.scenario.moving_arm())?;
         let line = BeltLine::new(&arm, self.posture);
-        // The tip starts at rest.
-        let slip = Slip::of(-self.scenario.belt.profile.speed_m_s(0.0));
+        let slip = self.scenario.slip_at_rest();
         let stretches = positive_stretches(|tau| line.p_per_kg(tau, self.mu, slip));
         let around = stretches
             .into_iter()
-            .map(|(from, to)| (line.tip_t_m(from), line.tip_t_m(to)))
-            .find(|(from, to)| *from <= start_m && start_m <= *to);
-        Ok(around.map_or(start_m, |(_, to)| to))
+            .find(|(from, to)| line.tip_t_m(*from) <= start_m && start_m <= line.tip_t_m(*to));
+        let Some((from, to)) = around else {
+            return Ok((start_m, RangeEnd::Limit));
+        };
+        let end = match slip {
+            Slip::Positive => to,
+            Slip::Negative => from,
+        };
+        let is_reach = end.abs() >= core::f64::consts::FRAC_PI_2;
+        let limit = if is_reach {
+            RangeEnd::Reach
+        } else {
+            RangeEnd::Limit
+        };
+        Ok((line.tip_t_m(end), limit))
     }
 
-    /// Returns the targets tried first: whole multiples of the step beyond the start, and the limit.
+    /// Returns the targets tried first: whole multiples of the step from the start to the limit, and the limit.
     fn targets(&self, start_m: f64, limit_m: f64) -> Vec<f64> {
         let step = self.criterion.scan_step_m;
-        let first = (start_m / step).floor() as i64 + 1;
+        let ahead: f64 = self.scenario.slip_at_rest().sign();
+        let first = (ahead * start_m / step).floor() as i64 + 1;
         let mut targets: Vec<f64> = (first..)
             .map(|index| index as f64 * step)
-            .take_while(|target| *target < limit_m)
+            .take_while(|target| *target < ahead * limit_m)
+            .map(|target| ahead * target)
             .collect();
         // Slightly less than the limit, so that the reference is within reach despite rounding.
-        targets.push(limit_m - 1e-6);
+        targets.push(limit_m - ahead * 1e-6);
         targets
     }
 

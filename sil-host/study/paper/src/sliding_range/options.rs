@@ -14,9 +14,10 @@ use super::{Criterion, Row, SlidingRange, SlidingRanges, page};
 
 /// How far the tip slides under each controller before it leaves the belt.
 ///
-/// The range ends at the farthest target before the first that fails; `fails by` says how: p = 0 is the limit, or the tip
-/// lifts off, stops short or late, or the controller latches a fault. Targets reached beyond it are in brackets; `–` is a
-/// range without any target.
+/// Targets lie in the direction in which the surface of the belt comes, as does the edge. The range ends at the farthest
+/// target before the first that fails; `fails by` says how: p = 0 or the end of the reach is the limit, or the tip lifts off,
+/// stops short or late, or the controller latches a fault. Targets reached beyond it are in brackets; `–` is a range without
+/// any target.
 #[derive(Debug, Args)]
 #[command(
     mut_arg("controller", |controller| {
@@ -106,7 +107,7 @@ impl StudyOptions for Options {
             controllers: once(&self.controllers.controller),
             converters: once(&self.converters.converters),
             postures: once(&self.posture).into_iter().map(Into::into).collect(),
-            mu: self.friction.mu.values().to_vec(),
+            mu: self.friction.of_controllers(&self.controllers.controller)?,
             references: once(&self.reference),
             overrides: self.overrides.overrides.clone(),
             criterion: Criterion {

@@ -18,10 +18,11 @@ impl Outcome for SlidingRanges {
             "posture",
             "μ",
             "reference",
-            "slides to zₜ (m)",
+            "reaches target (m)",
+            "tip there (m)",
             "fails by",
             "the paper (m)",
-            "p = 0 (m)",
+            "limit (m)",
         ]);
         for row in &self.rows {
             let slides = row
@@ -37,6 +38,8 @@ impl Outcome for SlidingRanges {
                 row.mu.to_string(),
                 row.reference.to_string(),
                 slides + &beyond,
+                row.tip_t_m
+                    .map_or("–".into(), |metres| format!("{metres:.4}")),
                 row.ends_by.name().into(),
                 row.paper_m.map_or("–".into(), |metres| metres.to_string()),
                 format!("{:.4}", row.limit_m),

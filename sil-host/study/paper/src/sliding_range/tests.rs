@@ -34,6 +34,29 @@ fn the_hybrid_law_goes_farther_than_in_the_paper_and_the_pid_lifts_off_elbow_up(
     assert_eq!(up.paper_m, None);
 }
 
+/// The paper's arm is symmetric: its mirror image has the other posture, slip and direction.
+#[test]
+fn on_a_belt_that_runs_the_other_way_the_tip_slides_the_other_way() {
+    let mut study = study(ControllerChoice::Hybrid, Posture::ElbowUp);
+    study.overrides = vec!["belt.profile={kind='constant',speed_m_s=0.4}".into()];
+    let row = study.row(0).unwrap();
+    assert!(row.start_m > 0.16, "{row:?}");
+    assert!((row.limit_m + 0.164_705).abs() < 1e-6, "{row:?}");
+    assert_eq!(row.ends_by, RangeEnd::Limit);
+    assert!(row.z_sliding_m.unwrap() < -0.16, "{row:?}");
+}
+
+/// Without friction p > 0 as far as the arm reaches.
+#[test]
+fn a_range_that_no_edge_limits_ends_with_the_reach() {
+    let mut study = study(ControllerChoice::Hybrid, Posture::ElbowDown);
+    study.mu = vec![0.05];
+    let row = study.row(0).unwrap();
+    assert!((row.limit_m - 0.184_103).abs() < 1e-5, "{row:?}");
+    let case = study.case(0).unwrap();
+    assert_eq!(case.limit_m(row.start_m).unwrap().1, RangeEnd::Reach);
+}
+
 /// Unequal links, offset centres of mass, a tip mass, a tilted belt.
 #[test]
 fn a_user_defined_arm_slides_to_its_own_edge_in_both_postures() {

@@ -3,7 +3,7 @@
 use core::ops::Range;
 
 use painleve_plant::scenario::Scenario;
-use painleve_shared::{Arm, Posture, Slip};
+use painleve_shared::{Arm, Posture};
 use painleve_study_core::StudyError;
 use painleve_study_core::case::{self, ConverterChoice};
 use rand::rngs::ChaCha8Rng;
@@ -67,7 +67,7 @@ impl EffectsStudy {
         let journey = Journey {
             arm: &arm,
             posture,
-            slip: Slip::of(-scenario.belt.profile.speed_m_s(0.0)),
+            slip: scenario.slip_at_rest(),
             friction: effect
                 .largest_friction
                 .map_or(friction, |largest| largest(level, friction)),

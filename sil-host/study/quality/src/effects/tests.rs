@@ -3,7 +3,7 @@
 use crate::plain;
 use painleve_plant::belt_line::BeltLine;
 use painleve_plant::mechanics::motion::theta;
-use painleve_shared::{Arm, Posture, Slip};
+use painleve_shared::{Arm, Posture};
 use painleve_study_core::outcome::Figure;
 use painleve_study_core::rows;
 
@@ -113,7 +113,7 @@ fn everything_together_has_targets_away_from_the_edge_of_the_arm_that_moves() {
             let scenario = study.scenario(place, run).unwrap();
             let arm = Arm::new(scenario.moving_arm()).unwrap();
             let posture = Posture::of(&theta(&scenario.initial.state(&scenario.arm).unwrap()));
-            let slip = Slip::of(-scenario.belt.profile.speed_m_s(0.0));
+            let slip = scenario.slip_at_rest();
             let friction = everything.largest_friction.unwrap()(share, scenario.belt.friction);
             let line = BeltLine::new(&arm, posture);
             let tau = line.tau(scenario.target_m().unwrap()).unwrap();

@@ -5,7 +5,7 @@ use painleve_firmware::law::LawSettings;
 use painleve_plant::scenario::Scenario;
 use painleve_plant::{Plant, PlantError};
 use painleve_shared::kinematics::Pose;
-use painleve_shared::{Arm, JointTorque, Slip};
+use painleve_shared::{Arm, JointTorque};
 
 use super::NotHeld;
 use painleve_plant::belt_line::p_ratio;
@@ -106,7 +106,7 @@ impl AtRest {
             None => joint_commands(),
         };
         // Near the edge the contact multiplies a force by Q22/p: a smaller disturbance keeps it.
-        let slip = Slip::of(-scenario.belt.profile.speed_m_s(0.0));
+        let slip = scenario.slip_at_rest();
         let moving = Arm::new(scenario.moving_arm())?;
         let p_ratio = p_ratio(&moving, &trial.theta_rad(), scenario.belt.friction, slip);
         for command in &mut commands {

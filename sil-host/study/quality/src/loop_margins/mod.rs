@@ -28,7 +28,7 @@ use std::collections::BTreeMap;
 
 use painleve_plant::mechanics::compliant::ContactKind;
 use painleve_plant::scenario::Scenario;
-use painleve_shared::{Arm, Posture, Slip};
+use painleve_shared::{Arm, Posture};
 use serde::Serialize;
 
 use painleve_plant::belt_line;
@@ -257,7 +257,7 @@ impl Study for LoopMargins {
         let scenario = self.scenario(index, &[])?;
         let arm = Arm::new(scenario.moving_arm())?;
         let theta = arm.link_angles_on_belt_rad(tip_m, self.posture);
-        let slip = Slip::of(-scenario.belt.profile.speed_m_s(0.0));
+        let slip = scenario.slip_at_rest();
         let p_ratio = theta.map_or(f64::NAN, |theta| {
             belt_line::p_ratio(&arm, &theta, scenario.belt.friction, slip)
         });

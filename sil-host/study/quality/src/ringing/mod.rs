@@ -179,7 +179,7 @@ impl Ringing {
 
 /// Direction of slip of a tip at rest.
 fn slip(scenario: &Scenario) -> Slip {
-    Slip::of(-scenario.belt.profile.speed_m_s(0.0))
+    scenario.slip_at_rest()
 }
 
 impl Study for Ringing {
