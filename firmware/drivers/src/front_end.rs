@@ -132,8 +132,12 @@ impl FrontEnd {
         *self = restarted;
     }
 
-    /// Permits or forbids the drive to arm.
+    /// Permits or forbids the drive to arm. After a new permission, ENABLE must be opened before it is closed: the arm moves
+    /// when the operator closes the switch, not when the host permits it.
     pub fn permit_arming(&mut self, permitted: bool) {
+        if permitted && !self.may_arm {
+            self.switches.must_open();
+        }
         self.may_arm = permitted;
     }
 
@@ -317,7 +321,9 @@ impl FrontEnd {
         };
         let settings = self.settings.as_ref();
         let limit = settings.and_then(|it| it.button_ticks);
-        self.may_arm |= limit == Some(self.pressed_ticks);
+        if limit == Some(self.pressed_ticks) {
+            self.permit_arming(true);
+        }
     }
 }
 

@@ -59,6 +59,11 @@ impl Switches {
         }
     }
 
+    /// Takes ENABLE for open until it has been opened and closed again.
+    pub fn must_open(&mut self) {
+        self.enable = Contact::default();
+    }
+
     /// Updates the state with the pins' levels of one tick.
     ///
     /// ENABLE goes low with its pin, in the same tick. It goes high again after its pin has been low for

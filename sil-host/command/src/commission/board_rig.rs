@@ -177,7 +177,6 @@ impl BoardRig {
 
     /// Waits until the board has armed.
     fn wait_for_enable(&mut self) -> Result<(), BoardRigError> {
-        self.arm.permit_arming_surely()?;
         let start = Instant::now();
         while start.elapsed() < ENABLE_LIMIT {
             let Some((sensor, answer)) = self.next_tick()? else {
@@ -201,6 +200,8 @@ impl Rig for BoardRig {
         // What was typed before confirms no task.
         self.operator.attend()?;
         if instruction == OperatorTask::Enable {
+            // A switch that is closed before the permission does not arm.
+            self.arm.permit_arming_surely()?;
             warn(format_args!("operator: {instruction}"));
             self.wait_for_enable()?;
             self.is_enabled = true;

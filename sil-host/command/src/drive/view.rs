@@ -51,10 +51,13 @@ impl View {
     /// Shows whether the drive may arm.
     pub fn show_permission(&mut self, permitted: bool) {
         self.permitted = permitted;
-        self.log(if permitted {
-            "arming is permitted: open the switch ENABLE, then close it"
-        } else {
-            "arming is not permitted"
+        let in_fault = |(state, _)| state == SupervisorState::Fault as u8;
+        self.log(match (permitted, self.reported.is_some_and(in_fault)) {
+            (true, false) => "arming is permitted: open the switch ENABLE, then close it",
+            (true, true) => {
+                "arming is permitted: open the switch ENABLE, press RESET, then close the switch"
+            }
+            (false, _) => "arming is not permitted",
         });
     }
 

@@ -36,7 +36,16 @@ fn an_arm_is_driven_after_the_order_and_the_switch_and_recorded() {
         rig.ticks() > ticks + 100
     });
     assert!(!rig.is_on());
+    // Nor does the order, with a switch that has been closed before it.
     program.order("arm");
+    program.wait_for("arming is permitted");
+    let ticks = rig.ticks();
+    rig.wait_until("arming has been permitted for a while", |rig| {
+        rig.ticks() > ticks + 100
+    });
+    assert!(!rig.is_on());
+    rig.open_switch();
+    rig.close_switch();
     rig.wait_until("the arm is driven", EmulatedRig::is_on);
     let ticks = rig.ticks();
     rig.wait_until("it has been driven for a while", |rig| {
@@ -76,7 +85,7 @@ fn dry_run(rig: &EmulatedRig, settings: &[&str]) -> Output {
     let dry = ["--dry-run", "--no-record", "--duration", "0.5"];
     let mut program = StartedProgram::drive(&rig.port, &[&dry[..], settings].concat());
     program.order("arm");
-    rig.wait_for_work();
+    program.wait_for("arming is permitted");
     rig.close_switch();
     program.end().0
 }
@@ -120,7 +129,7 @@ fn ctrl_c_and_a_killed_program_take_the_torque_off() {
         let rig = EmulatedRig::new();
         let mut program = StartedProgram::drive(&rig.port, &["--no-record"]);
         program.order("arm");
-        rig.wait_for_work();
+        program.wait_for("arming is permitted");
         rig.close_switch();
         rig.wait_until("the arm is driven", EmulatedRig::is_on);
         let ticks = rig.ticks();

@@ -86,7 +86,12 @@ impl EmulatedRig {
         self.observed.ticks.load(Ordering::SeqCst)
     }
 
+    /// Closes the switch, as fast as a hand does: it is debounced.
     pub fn close_switch(&self) {
+        let ticks = self.ticks();
+        self.wait_until("the board has seen the switch open", |rig| {
+            rig.ticks() > ticks + 20
+        });
         self.observed.switch_closed.store(true, Ordering::SeqCst);
     }
 
@@ -176,6 +181,8 @@ pub fn is_readable(line: &File) -> bool {
 pub struct StartedProgram {
     pub child: Child,
     pub folder: painleve_tests::Bench,
+    /// What it has said on standard error, as far as it has been waited for.
+    said: Vec<u8>,
 }
 
 impl StartedProgram {
@@ -199,7 +206,22 @@ impl StartedProgram {
             .stdout(Stdio::piped())
             .stderr(Stdio::piped());
         let child = command.spawn().unwrap();
-        Self { child, folder }
+        Self {
+            child,
+            folder,
+            said: Vec::new(),
+        }
+    }
+
+    /// Waits until it has said this on standard error.
+    pub fn wait_for(&mut self, part: &str) {
+        let stderr = self.child.stderr.as_mut().unwrap();
+        while !String::from_utf8_lossy(&self.said).contains(part) {
+            let mut some = [0; 256];
+            let count = stderr.read(&mut some).unwrap();
+            self.said.extend_from_slice(&some[..count]);
+            assert!(count > 0, "{}", String::from_utf8_lossy(&self.said));
+        }
     }
 
     /// Types a line.
@@ -208,7 +230,10 @@ impl StartedProgram {
         writeln!(stdin, "{order}").unwrap();
     }
 
+    /// Returns what it has said when it has ended.
     pub fn end(self) -> (Output, painleve_tests::Bench) {
-        (self.child.wait_with_output().unwrap(), self.folder)
+        let mut output = self.child.wait_with_output().unwrap();
+        output.stderr.splice(0..0, self.said);
+        (output, self.folder)
     }
 }

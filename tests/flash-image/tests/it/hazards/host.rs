@@ -23,6 +23,7 @@ crate::on_each_board! {
     a_request_to_stop_takes_the_torque_off,
     nothing_arms_without_the_hosts_permission,
     a_drive_that_was_switched_off_needs_a_new_permission,
+    a_permission_does_not_arm_while_the_switch_is_closed,
     a_dry_run_controls_with_the_stages_off,
     a_configuration_of_another_build_is_refused,
     a_configuration_is_accepted_while_the_arm_is_driven,
@@ -207,6 +208,22 @@ fn a_drive_that_was_switched_off_needs_a_new_permission<C: BoardChip>() {
     bench.assert_stays_off(20);
     bench.board.enable(true);
     bench.assert_stays_off(100);
+}
+
+/// The arm moves when the operator closes the switch, never when the host permits it.
+fn a_permission_does_not_arm_while_the_switch_is_closed<C: BoardChip>() {
+    let mut bench = driven::<C>();
+    bench.board.enable(false);
+    assert!(bench.time_until_off().is_some());
+    bench.assert_stays_off(20);
+    bench.board.enable(true);
+    bench.assert_stays_off(20);
+    assert!(bench.board.permit_arming());
+    bench.assert_stays_off(100);
+    bench.board.enable(false);
+    bench.assert_stays_off(20);
+    bench.board.enable(true);
+    assert!(!bench.stays_off(100));
 }
 
 fn a_dry_run_controls_with_the_stages_off<C: BoardChip>() {
