@@ -206,6 +206,7 @@ pub fn run(arguments: &RunArguments) -> Result<(), CommandError> {
     // Validate before any process starts, so that an error is reported once.
     let scenario = arguments.scenario.load()?;
     arguments.check_options()?;
+    warn_of_rehearsal(&scenario);
     if let Some(port) = arguments.live {
         return live(arguments, &scenario, command, port);
     }
@@ -305,6 +306,18 @@ pub fn run(arguments: &RunArguments) -> Result<(), CommandError> {
         return Err(failure(status));
     }
     fail_on::check(&arguments.fail_on, &report)
+}
+
+/// Warns of a model that a rehearsal has identified: the arm that it simulated is not the one that runs.
+fn warn_of_rehearsal(scenario: &Scenario) {
+    let knowledge = &scenario.knowledge;
+    if knowledge.is_rehearsed() && scenario.arm_model.is_some() {
+        warn(format_args!(
+            "arm_model and encoder corrections are those of another simulated arm (knowledge.source: {}); this run's arm is \
+             that of [arm]",
+            knowledge.source
+        ));
+    }
 }
 
 /// Returns the failure of a controller's process that is this command's as well: an output that it could not write, or a bug.

@@ -1,5 +1,6 @@
 //! How smooth a controller's torque and contact force are: a rough torque heats windings and wears gears.
 
+use painleve_shared::counts::Micrometres;
 use painleve_shared::frame::ActuatorFrame;
 use painleve_shared::status::SupervisorState;
 
@@ -7,6 +8,9 @@ use crate::converters::ConverterSettings;
 
 /// Velocity from which a reference counts as moving, m/s. One that an edge holds back creeps with the estimated edge.
 const MOVING_M_S: f64 = 5e-3;
+
+/// Time over which that velocity is taken, s: the reference is in whole micrometres.
+const VELOCITY_S: f64 = 1e-3;
 
 /// Time after which a reference that has come to rest counts as standing, s. Landing and the end of a motion are neither:
 /// the force then rises to its desired value.
@@ -20,6 +24,10 @@ pub struct Smoothness {
     /// While it stands.
     pub holding: Roughness,
     tick_hz: f64,
+    /// Whether the reference moves.
+    moves: bool,
+    /// Where it was when its velocity was last taken, and the ticks since.
+    way: (Micrometres, u32),
     /// Ticks since the reference moved, or since tracking began.
     rest_ticks: u64,
     /// The answer before, if the controller tracked, and the changes of torque that it brought, counts.
@@ -82,6 +90,8 @@ impl Smoothness {
             moving: Roughness::default(),
             holding: Roughness::default(),
             tick_hz,
+            moves: false,
+            way: (Micrometres(0), 0),
             rest_ticks: 0,
             last: None,
         }
@@ -100,13 +110,20 @@ impl Smoothness {
             self.rest_ticks = 0;
             return;
         }
+        let here = answer.reference_tip;
         let mut changes = [0; 2];
         if let Some((last, before)) = &self.last {
             for (joint, change) in changes.iter_mut().enumerate() {
                 *change = i64::from(answer.torques[joint].0) - i64::from(last.torques[joint].0);
             }
-            let way_m = answer.reference_tip.to_metres() - last.reference_tip.to_metres();
-            if way_m.abs() * self.tick_hz > MOVING_M_S {
+            let (from, ticks) = (self.way.0, self.way.1 + 1);
+            let time_s = f64::from(ticks) / self.tick_hz;
+            self.way = (from, ticks);
+            if time_s >= VELOCITY_S {
+                self.moves = (here.to_metres() - from.to_metres()).abs() > MOVING_M_S * time_s;
+                self.way = (here, 0);
+            }
+            if self.moves {
                 self.rest_ticks = 0;
                 self.moving.add(changes, *before, normal_force_n);
             } else {
@@ -115,6 +132,8 @@ impl Smoothness {
                     self.holding.add(changes, *before, normal_force_n);
                 }
             }
+        } else {
+            self.way = (here, 0);
         }
         self.last = Some((*answer, changes));
     }
@@ -123,7 +142,7 @@ impl Smoothness {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use painleve_shared::counts::{Micrometres, TorqueCounts};
+    use painleve_shared::counts::TorqueCounts;
 
     fn answer(torques: [i32; 2], reference_um: i32) -> ActuatorFrame {
         ActuatorFrame {
@@ -131,6 +150,20 @@ mod tests {
             reference_tip: Micrometres(reference_um),
             state: SupervisorState::Tracking as u8,
             ..Default::default()
+        }
+    }
+
+    /// One micrometre in one tick at 10 kHz is 10 mm/s.
+    #[test]
+    fn a_reference_that_creeps_stands_at_every_rate() {
+        for ticks_per_ms in [1, 2, 5, 10] {
+            let mut smoothness = Smoothness::new(1000.0 * f64::from(ticks_per_ms));
+            for tick in 0..2000 * ticks_per_ms {
+                let creep_um = tick / (4 * ticks_per_ms);
+                smoothness.add(Some(&answer([tick % 2, 0], creep_um)), 10.0);
+            }
+            assert_eq!(smoothness.moving.torque_change_counts(), None);
+            assert!(smoothness.holding.reversals().is_some(), "{ticks_per_ms}");
         }
     }
 

@@ -16,6 +16,8 @@ pub struct Statistics {
     pub impacts: u64,
     /// Impacts without collision.
     pub impacts_without_collision: u64,
+    /// Smallest tip position along the belt, m.
+    pub min_tip_t_m: f64,
     /// Largest tip position along the belt, m.
     pub max_tip_t_m: f64,
     /// Smallest normal force after the settling time, N; zero in flight.
@@ -40,6 +42,7 @@ impl Statistics {
             contact: ContactProbe::new(f64::NEG_INFINITY, CAPTURE_S),
             impacts: 0,
             impacts_without_collision: 0,
+            min_tip_t_m: f64::INFINITY,
             max_tip_t_m: f64::NEG_INFINITY,
             min_normal_force_n: f64::INFINITY,
             normal_force_n: 0.0,
@@ -52,6 +55,7 @@ impl Statistics {
 
     #[inline]
     fn observe(&mut self, at: &Snapshot) {
+        self.min_tip_t_m = self.min_tip_t_m.min(at.tip_t_m);
         self.max_tip_t_m = self.max_tip_t_m.max(at.tip_t_m);
         self.normal_force_n = at.normal_force_n;
         self.peak_torque_nm = self.peak_torque_nm.max(at.torque_nm.amax());

@@ -5,8 +5,10 @@ use std::time::Duration;
 use comfy_table::CellAlignment;
 use hdrhistogram::Histogram;
 use painleve_plant::closed_loop::LoopResult;
+use painleve_plant::decimal::as_written;
 use painleve_plant::scenario::Scenario;
 use painleve_process::terminal;
+use painleve_shared::{Arm, Pose};
 use serde::{Deserialize, Serialize};
 
 use crate::paradox::ParadoxDistance;
@@ -67,6 +69,9 @@ pub struct RunReport {
     pub impacts: u64,
     /// Number of impacts without collision.
     pub impacts_without_collision: u64,
+    /// Smallest tip position, m.
+    #[serde(default)]
+    pub min_tip_t_m: f64,
     /// Largest tip position, m.
     pub max_tip_t_m: f64,
     /// Tip position at the end, m.
@@ -77,6 +82,9 @@ pub struct RunReport {
     /// requests none.
     #[serde(default)]
     pub requested_target_m: Option<f64>,
+    /// Whether the governor holds the reference back at the end.
+    #[serde(default)]
+    pub at_edge: bool,
     /// Distance of the tip from the governed reference at the end, m.
     #[serde(default)]
     pub error_m: f64,
@@ -91,6 +99,9 @@ pub struct RunReport {
     /// In words, what that distance is kept for above all; null without it.
     #[serde(default)]
     pub chief_doubt: Option<String>,
+    /// Least p that is kept where `controller.governor.p_per_kg` and not p/Q22 holds the reference back, 1/kg; null elsewhere.
+    #[serde(default)]
+    pub kept_p_per_kg: Option<f64>,
     /// Smallest normal force after the first 50 ms, N; null for shorter runs.
     pub min_normal_force_n: Option<f64>,
     /// Largest joint torque, N·m.
@@ -174,16 +185,19 @@ impl RunReport {
                 && result.fault.is_none(),
             impacts: statistics.impacts,
             impacts_without_collision: statistics.impacts_without_collision,
+            min_tip_t_m: statistics.min_tip_t_m,
             max_tip_t_m: statistics.max_tip_t_m,
             final_tip_t_m: result.final_tip_t_m,
             final_reference_m: result.final_reference_m,
             requested_target_m: scenario
                 .target_m()
                 .filter(|_| scenario.controller.law.name() != "off"),
+            at_edge: result.at_edge,
             error_m: (result.final_tip_t_m - result.final_reference_m).abs(),
             to_edge_m: to_edge_m(scenario, result),
             distance_for_knowledge_m,
-            chief_doubt: (distance_for_knowledge_m > 0.0)
+            kept_p_per_kg: kept_p_per_kg(scenario, result),
+            chief_doubt: (distance_for_knowledge_m >= TOLD_M)
                 .then(|| {
                     scenario
                         .knowledge
@@ -239,7 +253,7 @@ impl RunReport {
         row(
             "impacts",
             format!(
-                "{} ({} without collision)",
+                "{} by collision, {} by the paradox alone",
                 self.impacts, self.impacts_without_collision
             ),
         );
@@ -256,15 +270,20 @@ impl RunReport {
             ),
         );
         // Held back by an edge, or not yet reached.
-        let is_short = |target_m: &f64| (target_m - self.final_reference_m).abs() > 5e-5;
+        let is_short = |target_m: &f64| (target_m - self.final_reference_m).abs() > TOLD_M;
         if let Some(target_m) = self.requested_target_m.filter(is_short) {
             let short_mm = 1e3 * (target_m - self.final_reference_m).abs();
             let known_mm = 1e3 * self.distance_for_knowledge_m;
-            let why = if known_mm < 0.05 {
+            let held = format!("; held {short_mm:.1} mm short");
+            let why = if !self.at_edge {
                 String::new()
-            } else {
+            } else if self.distance_for_knowledge_m >= TOLD_M {
                 let doubt = self.chief_doubt.as_deref().unwrap_or(UNKNOWN_PLACE);
-                format!("; held {short_mm:.1} mm short: {known_mm:.1} mm of it because {doubt}")
+                format!("{held}: {known_mm:.1} mm of it because {doubt}")
+            } else if let Some(p_per_kg) = self.kept_p_per_kg {
+                format!("{held}: controller.governor.p_per_kg keeps p at {p_per_kg} or more")
+            } else {
+                held
             };
             row("requested", format!("{:+.2} mm{why}", 1e3 * target_m));
         }
@@ -274,7 +293,11 @@ impl RunReport {
                 format!("{:.2} mm", 1e3 * to_edge_m),
             );
         }
-        row("farthest tip", format!("{:+.2} mm", 1e3 * self.max_tip_t_m));
+        let [least_mm, largest_mm] = [self.min_tip_t_m, self.max_tip_t_m].map(|it| 1e3 * it);
+        row(
+            "tip along the belt",
+            format!("{least_mm:+.2} … {largest_mm:+.2} mm"),
+        );
         let force = self
             .min_normal_force_n
             .map_or("–".into(), |force| format!("{force:.2} N"));
@@ -303,7 +326,7 @@ impl RunReport {
         row(
             "ticks",
             format!(
-                "{}, {} with limited torque, {} without answer",
+                "{}, {} with clipped torque, {} without answer",
                 self.ticks, self.saturated_ticks, self.stale_ticks
             ),
         );
@@ -342,6 +365,9 @@ impl RunReport {
     }
 }
 
+/// Least distance that is told, m.
+const TOLD_M: f64 = 5e-5;
+
 /// Why a distance is kept if `[knowledge]` does not say it.
 const UNKNOWN_PLACE: &str = "the tip is known to controller.estimator.tip_deviation_m";
 
@@ -356,6 +382,16 @@ fn to_edge_m(scenario: &Scenario, result: &LoopResult) -> Option<f64> {
         result.final_p_per_kg,
         direction,
     )
+}
+
+/// Returns the least p of the governor's settings if it is more than what the ratio p/Q22 asks for where the tip is held, 1/kg.
+fn kept_p_per_kg(scenario: &Scenario, result: &LoopResult) -> Option<f64> {
+    let governor = &scenario.controller.governor;
+    let arm = Arm::new(scenario.moving_arm()).ok()?;
+    let pose = Pose::new(&result.final_theta_rad);
+    let by_ratio = f64::from(governor.p_ratio) * arm.inverse_tip_inertia_per_kg(&pose).m22;
+    let p_per_kg = as_written(governor.p_per_kg);
+    (result.at_edge && p_per_kg > by_ratio).then_some(p_per_kg)
 }
 
 /// Returns by how much the governor's distance is larger because the arm is not known exactly, m.

@@ -5,7 +5,7 @@ mod rehearsal;
 
 use std::path::{Path, PathBuf};
 
-use clap::Args;
+use clap::{ArgGroup, Args};
 use painleve_commission::second_sensors::{self, SecondSensors};
 use painleve_commission::simulated::{BuiltInMistake, SimulatedRig};
 use painleve_commission::{
@@ -30,6 +30,7 @@ use super::{CommandError, distinct_files, say};
 
 /// Options of `painleve commission`.
 #[derive(Debug, Args)]
+#[command(group = ArgGroup::new("arm").args(["port", "rehearse"]).required(true).multiple(true))]
 pub struct CommissionArguments {
     /// Built-in scenario or TOML file with the arm's configuration.
     #[arg(value_name = "SCENARIO", default_value = built_in::DEFAULT)]
@@ -38,12 +39,7 @@ pub struct CommissionArguments {
     #[arg(long = "set", value_name = "KEY=VALUE")]
     overrides: Vec<String>,
     /// Serial port of the board, for example /dev/ttyUSB0.
-    #[arg(
-        long,
-        value_name = "PATH",
-        required_unless_present = "rehearse",
-        requires = "scenario"
-    )]
+    #[arg(long, value_name = "PATH", requires = "scenario")]
     pub port: Option<PathBuf>,
     /// Commission the second sensors of each channel, after the first ones: finds their directions.
     #[arg(long)]

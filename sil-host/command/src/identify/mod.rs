@@ -9,7 +9,7 @@ mod residuals;
 use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 
-use clap::Args;
+use clap::{ArgGroup, Args};
 use painleve_commission::identification::{
     Found, IdentificationError, identify_arm, identify_slides, is_new, prior,
 };
@@ -46,6 +46,7 @@ const CHANGED: f64 = 2.0;
 
 /// Options of `painleve identify`.
 #[derive(Debug, Args)]
+#[command(group = ArgGroup::new("arm").args(["port", "rehearse", "slide"]).required(true).multiple(true))]
 pub struct IdentifyArguments {
     /// Built-in scenario or TOML file with the arm's configuration.
     #[arg(value_name = "SCENARIO", default_value = built_in::DEFAULT)]
@@ -55,7 +56,6 @@ pub struct IdentifyArguments {
     overrides: Vec<String>,
     /// Serial port of the board, for example /dev/ttyUSB0.
     #[arg(long, value_name = "PATH", requires = "scenario")]
-    #[arg(required_unless_present_any = ["rehearse", "slide"])]
     pub port: Option<PathBuf>,
     /// Rehearse on a simulated arm with random errors that the scenario does not know.
     #[arg(long, conflicts_with_all = ["port", "slide"])]

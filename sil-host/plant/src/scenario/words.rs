@@ -69,6 +69,18 @@ pub(super) fn in_words(message: &str, setting: Option<&Field>) -> String {
     if message == "duplicate key" {
         return "this key is there already: give it once, or merge the two tables".into();
     }
+    if let (true, Some(Shape::Choice { variants, .. })) = (
+        message.starts_with("wanted exactly 1 element"),
+        setting.map(|setting| setting.shape),
+    ) {
+        let kinds: Vec<&str> = variants.iter().map(|variant| variant.key).collect();
+        let example = variants.iter().find(|variant| variant.content.is_some());
+        let example = example.map_or("", |variant| variant.key);
+        return format!(
+            "give one kind, a table as in {{ {example} = {{ … }} }}; known: {}",
+            kinds.join(", ")
+        );
+    }
     let mismatch = ["invalid type: ", "invalid value: ", "invalid length "];
     let mismatch = mismatch
         .into_iter()

@@ -110,7 +110,7 @@ fn a_law_that_the_study_sets_is_refused_with_the_option_that_chooses_it() {
 #[test]
 fn keys_that_a_study_without_control_does_not_use_are_refused() {
     for (study, keys) in [
-        ("admissible", "arm"),
+        ("admissible", "arm, belt"),
         ("regions", "arm"),
         ("bifurcation", "arm, impact, solver"),
         ("poincare", "arm, impact, solver"),

@@ -12,7 +12,6 @@ use crate::printed;
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct IntervalLine {
     mu: f64,
-    slip: Slip,
     posture: Posture,
     from_m: f64,
     to_m: f64,
@@ -20,6 +19,7 @@ pub struct IntervalLine {
     paper_to_m: Option<f64>,
     difference_m: Option<f64>,
     critical_friction: f64,
+    slip: Slip,
 }
 
 impl Admissible {
@@ -46,7 +46,6 @@ impl Outcome for Admissible {
             for &[from_m, to_m] in &intervals.intervals_m {
                 lines.push(IntervalLine {
                     mu: self.mu,
-                    slip: self.slip,
                     posture,
                     from_m,
                     to_m,
@@ -54,6 +53,7 @@ impl Outcome for Admissible {
                     paper_to_m: intervals.paper_m.map(|paper| paper[1]),
                     difference_m: intervals.difference_m,
                     critical_friction: self.critical_friction,
+                    slip: self.slip,
                 });
             }
         }
