@@ -29,6 +29,8 @@ def torques(now, before, start, tick_s):
 
 
 def main():
+    if len(sys.argv) != 2:
+        sys.exit("usage: controller.py BUS")
     bus = Bus(sys.argv[1], "python spring")
     start = before = None
     for sensor in bus:

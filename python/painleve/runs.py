@@ -62,6 +62,9 @@ def sweep(
     the runs that have begun are done."""
     import pandas
 
+    for name, values in keys.items():
+        if isinstance(values, str) or not isinstance(values, Iterable):
+            raise TypeError(f"{name} = {values!r}: give a list of values")
     names = list(keys)
     settings = [dict(zip(names, values)) for values in itertools.product(*(list(keys[name]) for name in names))]
 
@@ -120,11 +123,13 @@ def plot(*runs: Run, labels: Sequence[str] = (), align: str = "start"):
     """Draws runs over time, one above the other in each panel, and returns the Matplotlib figure."""
     import matplotlib.pyplot as pyplot
 
+    if labels and len(labels) != len(runs):
+        raise ValueError(f"labels: {len(labels)} for {len(runs)} runs")
     figure, axes = pyplot.subplots(len(PANELS), sharex=True, figsize=(8, 9), layout="constrained")
     for number, columns in enumerate(runs):
         zero = _zero(columns, align)
         times = [time_s - zero for time_s in columns["time_s"]]
-        label = labels[number] if number < len(labels) else None
+        label = labels[number] if labels else None
         for axis, (title, names) in zip(axes, PANELS):
             axis.set_ylabel(title)
             for which, name in enumerate(names):

@@ -325,6 +325,10 @@ impl PySimulation {
         if !self.is_sampled {
             return Err(PyRuntimeError::new_err("sample() comes before advance()"));
         }
+        if let Some(frame) = &frame {
+            let refused = self.simulation.check_answer(frame);
+            refused.map_err(|error| PyValueError::new_err(error.to_string()))?;
+        }
         self.is_sampled = false;
         py.detach(|| self.simulation.advance(frame.as_ref(), &mut ()))
             .map_err(|error| exception(&error))

@@ -137,10 +137,12 @@ pub enum BoardError {
     #[error("the board has taken no bytes for {:.1} s: its image or its USB adapter hangs", .0.as_secs_f64())]
     Deaf(Duration),
     /// The emulator has ended on its own.
-    #[error("the emulated board has stopped ({0}): run with --log to see the log of its image")]
+    #[error(
+        "the emulated STM32F405 has stopped ({0}): give an image for this chip; with --log, run shows its log"
+    )]
     Ended(ExitStatus),
     /// The board has been silent for too long.
-    #[error("the board has not answered for {:.1} s: its image hangs or is missing", .0.as_secs_f64())]
+    #[error("the board has not answered for {:.1} s: its image hangs or is missing, or this program was suspended", .0.as_secs_f64())]
     Silent(Duration),
     /// What arrives on the serial line are no frames.
     #[error(
@@ -226,8 +228,8 @@ pub enum BoardError {
 fn other_rates(refused: &RefusedRate) -> String {
     match [refused.below_hz, refused.above_hz] {
         [0, 0] => "there is none for this board".into(),
-        [hz, 0] | [0, hz] => format!("the nearest that it accepts is {hz} Hz"),
-        [below, above] => format!("the nearest that it accepts are {below} and {above} Hz"),
+        [hz, 0] | [0, hz] => format!("it accepts, for example, {hz} Hz"),
+        [below, above] => format!("it accepts, for example, {below} and {above} Hz"),
     }
 }
 

@@ -102,7 +102,7 @@ extern "C" {
 #endif // __cplusplus
 
 // Returns the message of this thread's last failed call, in one sentence; empty if no call has
-// failed. It is valid until this thread's next failed call.
+// failed. It is valid until this thread's next failed call: call it after that one, not among the arguments of one call with it.
 const char *painleve_last_error(void);
 
 // Creates the controller of a scenario.
@@ -143,7 +143,7 @@ PainleveStatus painleve_plant_sample(PainlevePlant *plant,
                                      bool *is_lost);
 
 // Accepts the answer to this tick's sample, or null if there is none, and advances to the next
-// tick.
+// tick. An answer to another tick, or with an unknown state or fault, is refused.
 //
 // # Safety
 // `plant` comes from [`painleve_plant_new`] and has not been freed, `actuator` is null or can be

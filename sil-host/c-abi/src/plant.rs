@@ -79,7 +79,7 @@ pub unsafe extern "C" fn painleve_plant_sample(
 }
 
 /// Accepts the answer to this tick's sample, or null if there is none, and advances to the next
-/// tick.
+/// tick. An answer to another tick, or with an unknown state or fault, is refused.
 ///
 /// # Safety
 /// `plant` comes from [`painleve_plant_new`] and has not been freed, `actuator` is null or can be
@@ -102,6 +102,9 @@ pub unsafe extern "C" fn painleve_plant_advance(
             return Err(CallError::WrongOrder(
                 "this tick has not been sampled: sample it before the plant advances",
             ));
+        }
+        if let Some(answer) = &answer {
+            plant.simulation.check_answer(answer)?;
         }
         plant.is_sampled = false;
         Ok(plant.simulation.advance(answer.as_ref(), &mut ())?)

@@ -6,6 +6,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 
 use painleve_plant::PlantError;
 use painleve_plant::scenario::{Scenario, ScenarioError};
+use painleve_plant::simulation::AnswerError;
 use painleve_shared::range::OutOfRange;
 
 /// Return value of a call.
@@ -38,6 +39,8 @@ pub(crate) enum CallError {
     #[error("{0}")]
     WrongOrder(&'static str),
     #[error(transparent)]
+    Answer(#[from] AnswerError),
+    #[error(transparent)]
     Scenario(#[from] ScenarioError),
     #[error(transparent)]
     Range(#[from] OutOfRange),
@@ -48,7 +51,7 @@ pub(crate) enum CallError {
 impl CallError {
     fn status(&self) -> PainleveStatus {
         match self {
-            Self::Null(_) | Self::NotAligned(_) | Self::NotUtf8(_) => {
+            Self::Null(_) | Self::NotAligned(_) | Self::NotUtf8(_) | Self::Answer(_) => {
                 PainleveStatus::InvalidArgument
             }
             Self::WrongOrder(_) => PainleveStatus::WrongOrder,
@@ -63,7 +66,7 @@ thread_local! {
 }
 
 /// Returns the message of this thread's last failed call, in one sentence; empty if no call has
-/// failed. It is valid until this thread's next failed call.
+/// failed. It is valid until this thread's next failed call: call it after that one, not among the arguments of one call with it.
 #[unsafe(no_mangle)]
 pub extern "C" fn painleve_last_error() -> *const c_char {
     LAST_ERROR.with_borrow(|message| message.as_ptr())

@@ -258,16 +258,29 @@ fn any_frame_has_an_answer_without_a_panic() {
         for counts in EXTREMES {
             let plant = new_plant(c"converters.torque.range_nm = 1e6");
             let (mut sensor, mut lost) = (PainleveSensorFrame::default(), false);
-            let answer = PainleveActuatorFrame {
+            let mut answer = PainleveActuatorFrame {
                 torques: [counts.cast_signed(), !counts.cast_signed()],
-                state: 255,
-                fault: 255,
+                state: 2,
                 flags: u16::MAX,
                 ..PainleveActuatorFrame::default()
             };
             for _ in 0..20 {
                 let mut status = painleve_plant_sample(plant, &mut sensor, &mut lost);
                 if status == Done {
+                    for (tick, state, fault) in [
+                        (sensor.tick, 255, 0),
+                        (sensor.tick, 2, 255),
+                        (sensor.tick.wrapping_sub(1), 2, 0),
+                    ] {
+                        let other = PainleveActuatorFrame {
+                            tick,
+                            state,
+                            fault,
+                            ..answer
+                        };
+                        assert_eq!(painleve_plant_advance(plant, &other), InvalidArgument);
+                    }
+                    answer.tick = sensor.tick;
                     status = painleve_plant_advance(plant, &answer);
                 }
                 // A million newton metres may be more than the motion can follow; that is an error, not a panic.

@@ -262,7 +262,9 @@ impl CommandError {
             Self::Sweep(SweepError::Incomplete { .. } | SweepError::Mismatch(_)) => 1,
             Self::Sweep(SweepError::Output(_)) => UNWRITABLE,
             Self::Sweep(_) => 2,
-            Self::Board(BoardError::NotAnImage(_)) => 2,
+            Self::Board(
+                BoardError::NotAnImage(_) | BoardError::Parts { .. } | BoardError::RateRefused(_),
+            ) => 2,
             Self::Loop(LoopError::Plant(_))
             | Self::Faulted(_)
             | Self::Mounting(_)

@@ -17,6 +17,7 @@ use painleve_process::interrupt::Interrupt;
 use painleve_process::realtime::{FIFO_PRIORITY, request_realtime};
 use painleve_process::terminal::warn;
 use painleve_shared::message::FrameSource;
+use painleve_shared::status::Fault;
 
 use super::output_error::output;
 use super::run::Host;
@@ -101,7 +102,14 @@ pub fn run(arguments: &TimingArguments) -> Result<(), CommandError> {
             .cyclictest
             .then(|| Cyclictest::start(scenario.run.tick_hz, scenario.run.ticks(), priority))
             .transpose()?;
-        reports.push(measure(arguments, scenario, &interrupt)?);
+        let report = measure(arguments, scenario, &interrupt)?;
+        if let Some(fault) = report.fault {
+            warn(format_args!(
+                "{}: the controller has latched fault {fault}; its ticks from then on do less than those that control",
+                scenario.name
+            ));
+        }
+        reports.push(report);
         if let Some(beside) = beside {
             reports.push(beside.finish()?);
         }
@@ -146,14 +154,13 @@ fn on_board<B: ConnectedBoard>(
     board: B,
     interrupt: &Interrupt,
 ) -> Result<TimingReport, CommandError> {
-    let OnBoard { mut board, times } = drive(scenario, OnBoard::new(board), interrupt)?;
+    let (OnBoard { mut board, times }, fault) = drive(scenario, OnBoard::new(board), interrupt)?;
     let tick_hz = scenario.run.tick_hz;
-    Ok(TimingReport::of_board(
-        &scenario.name,
-        tick_hz,
-        &times,
-        &mut board,
-    )?)
+    let report = TimingReport::of_board(&scenario.name, tick_hz, &times, &mut board)?;
+    Ok(TimingReport {
+        fault: fault.map(|fault| fault as u8),
+        ..report
+    })
 }
 
 fn by_the_clock(scenario: &Scenario, interrupt: &Interrupt) -> Result<TimingReport, CommandError> {
@@ -161,12 +168,13 @@ fn by_the_clock(scenario: &Scenario, interrupt: &Interrupt) -> Result<TimingRepo
     let range = |source| ScenarioError::range(&scenario.name, source);
     let controller = InProcess::new(&configuration).map_err(range)?;
     let metronome = Metronome::start(controller, &configuration)?;
-    let metronome = drive(scenario, metronome, interrupt)?;
+    let (metronome, fault) = drive(scenario, metronome, interrupt)?;
     let (name, unit) = (&scenario.name, Unit::Nanoseconds);
     let tick_hz = scenario.run.tick_hz;
     let host = &Host::Native.name();
     Ok(TimingReport {
         missed_deadlines: metronome.missed_deadlines,
+        fault: fault.map(|fault| fault as u8),
         ..TimingReport::new(name, tick_hz, host, "wake-up", unit, &metronome.lateness_ns)
     })
 }
@@ -175,7 +183,7 @@ fn drive<H: ControllerHost>(
     scenario: &Scenario,
     host: H,
     interrupt: &Interrupt,
-) -> Result<H, CommandError> {
+) -> Result<(H, Option<Fault>), CommandError> {
     let range = |source| ScenarioError::range(&scenario.name, source);
     let simulation = Simulation::new(scenario).map_err(range)?;
     let mut closed_loop = ClosedLoop::new(simulation, host);
@@ -185,5 +193,6 @@ fn drive<H: ControllerHost>(
             return Err(CommandError::Interrupted);
         }
     }
-    Ok(closed_loop.finish().1)
+    let (result, host) = closed_loop.finish();
+    Ok((host, result.fault))
 }

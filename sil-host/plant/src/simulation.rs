@@ -57,6 +57,27 @@ impl Simulation {
     }
 }
 
+/// Why a frame is no answer.
+#[derive(Debug, thiserror::Error)]
+pub enum AnswerError {
+    /// It is to another tick.
+    #[error("the answer is to tick {tick}, but tick {sampled} has been sampled")]
+    OtherTick {
+        /// Its tick.
+        tick: u32,
+        /// The tick that has been sampled.
+        sampled: u32,
+    },
+    /// Its state or its fault is unknown.
+    #[error("the answer has state {state} and fault {fault}, at least one of which is unknown")]
+    NotUnderstood {
+        /// Number of the state.
+        state: u8,
+        /// Number of the fault.
+        fault: u8,
+    },
+}
+
 impl Simulation {
     /// Gives the belt this friction and speed from now on.
     pub fn set_belt(&mut self, belt: &BeltSettings) {
@@ -146,8 +167,7 @@ impl<P: Plant> Simulation<P> {
         let force_n = self.plant.contact_force_n();
         let force = self.force_cell.read(&force_n, time_s);
         let enabled = time_s >= self.enable_at_s;
-        // The counters on the wire wrap.
-        let tick = self.first_tick.wrapping_add(self.clock.tick() as u32);
+        let tick = self.frame_tick();
         Ok(SensorFrame {
             tick,
             sequence: tick,
@@ -160,6 +180,27 @@ impl<P: Plant> Simulation<P> {
                 DigitalInputs::default()
             },
         })
+    }
+
+    /// Returns the number of this tick in its frames, where it wraps.
+    fn frame_tick(&self) -> u32 {
+        self.first_tick.wrapping_add(self.clock.tick() as u32)
+    }
+
+    /// Checks that an answer is one to this tick.
+    ///
+    /// # Errors
+    /// [`AnswerError`] if it is to another tick, or not understood.
+    pub fn check_answer(&self, answer: &ActuatorFrame) -> Result<(), AnswerError> {
+        let (tick, sampled) = (answer.tick, self.frame_tick());
+        let &ActuatorFrame { state, fault, .. } = answer;
+        if tick != sampled {
+            return Err(AnswerError::OtherTick { tick, sampled });
+        }
+        if !answer.is_understood() {
+            return Err(AnswerError::NotUnderstood { state, fault });
+        }
+        Ok(())
     }
 
     /// Returns whether the watchdog of the torque stages has removed the torque.

@@ -36,6 +36,8 @@ pub struct TimingReport {
     pub worst: Option<WorstTick>,
     /// Ticks not finished when the next was due.
     pub missed_deadlines: u64,
+    /// Number of the fault latched at the end; null for none.
+    pub fault: Option<u8>,
     /// Largest stack use on a board, bytes.
     pub stack_bytes: Option<u32>,
     /// The board's counters.
@@ -59,7 +61,7 @@ impl TimingReport {
     ) -> Result<Self, BoardError> {
         let health = board.health()?;
         Ok(Self {
-            stack_bytes: Some(health.stack_bytes),
+            stack_bytes: (health.stack_bytes > 0).then_some(health.stack_bytes),
             board: Some(health),
             line: board.line(),
             missed_deadlines: health.lapses.overruns.into(),
@@ -89,6 +91,7 @@ impl TimingReport {
             max: times.at_quantile(1.0),
             worst: times.worst().cloned(),
             missed_deadlines: 0,
+            fault: None,
             stack_bytes: None,
             board: None,
             line: None,

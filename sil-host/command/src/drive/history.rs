@@ -1,6 +1,9 @@
 //! The board's black box in words.
 
+use std::fmt::Display;
+
 use painleve_shared::black_box::{BlackBox, Crash, ResetCause};
+use painleve_shared::counts::{EncoderCounts, ForceCounts};
 
 /// Describes the last reset, crash and fault, one line each; a board that was just switched on has none.
 pub fn lines(content: &BlackBox) -> Vec<String> {
@@ -23,18 +26,29 @@ pub fn lines(content: &BlackBox) -> Vec<String> {
     if let Some(fault) = content.fault
         && let Some(latched) = fault.answer.latched_fault()
     {
+        let [joint_1, joint_2] = fault.sensor.joints;
+        let (normal, tangential) = (fault.sensor.normal_force, fault.sensor.tangential_force);
         lines.push(format!(
-            "board: last fault {} at tick {}: {}; torque {:?}, encoders {:?}, f_n {}, f_t {} counts",
+            "board: last fault {} at tick {}: {}; torque {:?}, encoders {}, {}, f_n {}, f_t {} counts",
             latched as u8,
             fault.answer.tick,
             latched.description(),
             fault.answer.torques.map(|it| it.0),
-            fault.sensor.joints.map(|it| it.0),
-            fault.sensor.normal_force.0,
-            fault.sensor.tangential_force.0,
+            reading(joint_1 != EncoderCounts::MISSING, joint_1.0),
+            reading(joint_2 != EncoderCounts::MISSING, joint_2.0),
+            reading(normal != ForceCounts::MISSING, normal.0),
+            reading(tangential != ForceCounts::MISSING, tangential.0),
         ));
     }
     lines
+}
+
+fn reading(is_there: bool, counts: impl Display) -> String {
+    if is_there {
+        counts.to_string()
+    } else {
+        "missing".into()
+    }
 }
 
 fn crash_text(crash: &Crash) -> String {

@@ -43,11 +43,11 @@ const HEALTH_INTERVAL: Duration = Duration::from_secs(1);
 #[derive(Debug, Args)]
 pub struct DriveArguments {
     /// Built-in scenario or TOML file with the arm's configuration.
-    #[arg(value_name = "SCENARIO", default_value = built_in::DEFAULT)]
+    #[arg(value_name = "SCENARIO", default_value = built_in::DEFAULT, hide_default_value = true)]
     #[arg(required_unless_present_any = ["stored", "forget"])]
     scenario: String,
     /// Override one key, for example controller.torque_limit_nm=0.5; may be repeated.
-    #[arg(long = "set", value_name = "KEY=VALUE")]
+    #[arg(long = "set", value_name = "KEY=VALUE", conflicts_with_all = ["stored", "forget"])]
     overrides: Vec<String>,
     /// Serial port of the board, for example /dev/ttyUSB0.
     #[arg(long, value_name = "PATH")]
@@ -302,6 +302,9 @@ impl Drive {
 /// Highest control rates at which the emulated boards read their sensors in time, Hz: one on each channel, and two.
 const FASTEST_HZ: [f64; 2] = [7500.0, 2500.0];
 
+/// Lowest control rate of a scenario, Hz.
+const SLOWEST_HZ: f64 = 10.0;
+
 /// Refuses a control rate at which the board cannot read the sensors at every tick.
 ///
 /// # Errors
@@ -313,7 +316,7 @@ pub(crate) fn check_rate(scenario: &Scenario) -> Result<(), ScenarioError> {
         SensorParts::First | SensorParts::Second => one,
     };
     let hz = f64::from(scenario.run.tick_hz);
-    range::check("run.tick_hz", hz, 1.0, fastest_hz)
+    range::check("run.tick_hz", hz, SLOWEST_HZ, fastest_hz)
         .map_err(|source| ScenarioError::range(&scenario.name, source))
 }
 

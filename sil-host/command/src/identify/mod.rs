@@ -48,8 +48,8 @@ const CHANGED: f64 = 2.0;
 #[derive(Debug, Args)]
 #[command(group = ArgGroup::new("arm").args(["port", "rehearse", "slide"]).required(true).multiple(true))]
 pub struct IdentifyArguments {
-    /// Built-in scenario or TOML file with the arm's configuration.
-    #[arg(value_name = "SCENARIO", default_value = built_in::DEFAULT)]
+    /// Built-in scenario or TOML file with the arm's configuration; hybrid-elbow-down by default in a rehearsal.
+    #[arg(value_name = "SCENARIO", default_value = built_in::DEFAULT, hide_default_value = true)]
     scenario: String,
     /// Override one key, for example converters.force.bits=13; may be repeated.
     #[arg(long = "set", value_name = "KEY=VALUE")]

@@ -131,7 +131,7 @@ fn sentences(found: &Found) -> Vec<String> {
         ),
         format!(
             "Its position is known to {:.2} mm plus {:.2} % for the length of link 1; its distance from the edges to {:.2} mm \
-             (before: {:.1} mm).",
+             (of a drawn arm: {:.1} mm).",
             1e3 * identified.place_deviation_m,
             100.0 * length_deviation,
             1e3 * identified.tip_deviation_m,
@@ -144,7 +144,7 @@ fn sentences(found: &Found) -> Vec<String> {
             found.ripple_m_s2
         ),
         format!(
-            "The belt is tilted by {} mrad more than belt_tilt_rad says; a level shows this better than slides do.",
+            "By the slides, the belt is tilted by {} mrad more than belt_tilt_rad says; a level shows this better.",
             spread(1e3 * tilt.value, 1e3 * tilt.deviation, 0)
         ),
     ];

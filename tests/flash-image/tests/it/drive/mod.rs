@@ -118,7 +118,7 @@ fn a_rate_at_which_the_sensors_cannot_be_read_is_refused() {
         let (output, _) = StartedProgram::drive(&rig.port, &arguments).end();
         assert_eq!(output.status.code(), Some(2));
         let text = errors(&output);
-        let range = format!("run.tick_hz = {rate} is outside the allowed range 1 to {fastest}");
+        let range = format!("run.tick_hz = {rate} is outside the allowed range 10 to {fastest}");
         assert!(text.contains(&range), "{text}");
     }
 }
