@@ -61,11 +61,10 @@ impl Model {
         let jacobian = arm.jacobian(pose);
         let mobility = arm.inverse_mass_matrix(pose);
         let sine_elbow = pose.sine_elbow();
-        let bounded = if sine_elbow < 0.0 {
-            sine_elbow.at_most(-STRAIGHT_ARM_SINE)
-        } else {
-            sine_elbow.at_least(STRAIGHT_ARM_SINE)
-        };
+        let bounded = sine_elbow
+            .abs()
+            .at_least(STRAIGHT_ARM_SINE)
+            .copysign(sine_elbow);
         let [length_1, length_2] = arm.link_length_m();
         // Accelerations of the links by each component of the contact force.
         let response = mobility * jacobian.transpose();
