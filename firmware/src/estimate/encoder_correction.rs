@@ -130,7 +130,7 @@ mod tests {
             let error = (estimator.angles_rad - joints).amax();
             let most = if tick < 100 { 0.02 } else { 6e-4 };
             assert!(error < most, "{tick}: {error}");
-            estimator.predict(&still);
+            estimator.predict(&still, 1);
             let pose = Pose::new(&estimator.theta_rad());
             estimator.expect_pose(&pose);
         }

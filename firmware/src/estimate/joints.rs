@@ -161,14 +161,9 @@ impl JointEstimator {
         JointMotion::from_array(self.counts.map(|counts| counts as f32 * self.rad_per_count))
     }
 
-    /// Predicts angles and rates at the next tick, given the expected acceleration of q' (rad/s²) until then.
-    #[inline]
-    pub fn predict(&mut self, acceleration_rad_s2: &JointMotion<f32>) {
-        self.predict_over(acceleration_rad_s2, 1);
-    }
-
+    /// Predicts angles and rates `ticks` later, given the expected acceleration of q' (rad/s²) until then.
     #[inline(always)]
-    fn predict_over(&mut self, acceleration_rad_s2: &JointMotion<f32>, ticks: u32) {
+    pub fn predict(&mut self, acceleration_rad_s2: &JointMotion<f32>, ticks: u32) {
         let (limit, time_s) = (self.settings.rate_limit_rad_s, ticks as f32 * self.tick_s);
         self.predicted_ticks = self.predicted_ticks.saturating_add(ticks);
         let before = self.rates_rad_s;
@@ -181,7 +176,7 @@ impl JointEstimator {
     /// Predicts the ticks of frames that have not arrived.
     #[inline(never)]
     fn bridge(&mut self, acceleration_rad_s2: &JointMotion<f32>, elapsed_ticks: u32) {
-        self.predict_over(acceleration_rad_s2, elapsed_ticks - self.predicted_ticks);
+        self.predict(acceleration_rad_s2, elapsed_ticks - self.predicted_ticks);
     }
 
     /// Leaves out the whole turns by which a joint of an arm without torque has been turned: targets are within half a turn
@@ -264,7 +259,7 @@ mod tests {
             let readings = [SCALE.reading(one), SCALE.reading(two)];
             let expected = JointMotion::new(acceleration, 0.0);
             if tick > 0 {
-                estimator.predict(&expected);
+                estimator.predict(&expected, 1);
             }
             let corrected = estimator.correct(&readings, 1, &expected, &JointTorque::zeros());
             let first = Err(Restart::FirstReadings);
@@ -323,7 +318,7 @@ mod tests {
                 let rate = estimator.theta_dot_rad_s().amax();
                 assert!(rate < 0.1, "{tick}: {rate}");
             }
-            estimator.predict(&still);
+            estimator.predict(&still, 1);
         }
     }
 
@@ -351,13 +346,13 @@ mod tests {
         for (lost_ticks, found) in [(30, Ok(())), (40, Err(Restart::FirstReadings))] {
             let mut state = track(|t| (1.5 * t, 0.1), 0.0, 200);
             for _ in 0..lost_ticks {
-                state.predict(&still);
+                state.predict(&still, 1);
             }
             assert_eq!(state.correct(&back, lost_ticks, &still, &no_torque), found);
         }
         let mut state = track(|t| (1.5 * t, 0.1), 0.0, 200);
         for _ in 0..10_000_000 {
-            state.predict(&still);
+            state.predict(&still, 1);
         }
         let _ = state.correct(&back, 10_000_000, &still, &no_torque);
         assert!((state.theta_rad().first() - 0.3).abs() < 1e-3);

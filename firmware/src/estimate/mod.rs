@@ -258,7 +258,8 @@ impl Estimators {
         } else {
             self.joints.unwind();
         }
-        self.joints.predict(&command.expected_acceleration_rad_s2);
+        self.joints
+            .predict(&command.expected_acceleration_rad_s2, 1);
         self.evaluate();
     }
 
