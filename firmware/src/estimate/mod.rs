@@ -155,10 +155,7 @@ impl Estimators {
             self.friction_filter
                 .correct(&mut contact.friction, &contact.force_n, is_dragged);
         }
-        let contact = &mut self.contact;
-        contact.p_per_kg = self
-            .model
-            .p_per_kg(contact.friction.coefficient, contact.friction.slip);
+        self.contact.p_per_kg = self.model.p_per_kg(&self.contact.friction);
     }
 
     /// Returns whether the force cell is not at the end of its range, where it reads less than the actual force.
@@ -273,7 +270,7 @@ impl Estimators {
         self.joints.expect_pose(&pose);
         self.model = Model::in_pose(&self.arm, &pose, theta, theta_dot, &disturbance_nm);
         let (model, contact) = (&self.model, &mut self.contact);
-        let p_per_kg = model.p_per_kg(contact.friction.coefficient, contact.friction.slip);
+        let p_per_kg = model.p_per_kg(&contact.friction);
         let p_ratio = p_per_kg / model.q22_per_kg;
         let response = self.response.response(p_per_kg, p_ratio);
         contact.p_per_kg = p_per_kg;

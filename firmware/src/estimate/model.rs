@@ -2,7 +2,9 @@
 //! that is predicted for it, before its readings arrive.
 
 use nalgebra::{Matrix2, Vector2};
-use painleve_shared::{Arm, GeneralisedTorque, JointTorque, LinkMotion, Pose, Real, Slip};
+use painleve_shared::{Arm, GeneralisedTorque, JointTorque, LinkMotion, Pose, Real};
+
+use super::friction::FrictionEstimate;
 
 /// |sin(θ2 − θ1)| below which J⁻¹ is bounded: the arm is nearly straight, and no torque can move
 /// the tip along the belt.
@@ -216,8 +218,8 @@ impl Model {
     }
 
     /// p = Q22 − μ s Q12, 1/kg.
-    pub fn p_per_kg(&self, friction: f32, slip: Slip) -> f32 {
-        self.q22_per_kg - friction * slip.sign::<f32>() * self.q12_per_kg
+    pub fn p_per_kg(&self, friction: &FrictionEstimate) -> f32 {
+        self.q22_per_kg - friction.coefficient * friction.slip.sign::<f32>() * self.q12_per_kg
     }
 }
 

@@ -81,17 +81,18 @@ fn at_rest(arm: &Arm<f32>) -> Model {
 
 /// Returns the contact of a tip that slides without pressing on a rigid belt, with known friction.
 fn sliding(coefficient: f32, model: &Model) -> ContactEstimate {
+    let friction = FrictionEstimate {
+        coefficient,
+        catch_up: 0.0,
+        variance: 0.0,
+        slip: Slip::Positive,
+        slip_seen: true,
+        sticks: false,
+    };
     ContactEstimate {
         touches: true,
-        friction: FrictionEstimate {
-            coefficient,
-            catch_up: 0.0,
-            variance: 0.0,
-            slip: Slip::Positive,
-            slip_seen: true,
-            sticks: false,
-        },
-        p_per_kg: model.p_per_kg(coefficient, Slip::Positive),
+        friction,
+        p_per_kg: model.p_per_kg(&friction),
         response: ContactResponse::rigid(1.0),
         ..Default::default()
     }
