@@ -120,18 +120,6 @@ pub struct Configuration<L: Law = LawSettings> {
     pub settings: ControllerSettings<L>,
 }
 
-/// Returns the lower of the natural frequencies of the stretched arm about either joint, on elastic gears of these
-/// compliances (rad/(N·m)) behind motors at rest: 1/√(c J). The inertia J contains the joint's rotor, as the arm's model
-/// does, although it is at rest: loops behind heavy rotors are slower than they need be. Infinite for stiff gears.
-fn natural_frequency_rad_s(arm: &Arm<f32>, compliance_rad_nm: [f32; 2]) -> f32 {
-    let inertia_kg_m2 = arm.mass_matrix(&Pose::new(&LinkMotion::zeros()));
-    let [soft_1, soft_2] = compliance_rad_nm;
-    // Joint 1 turns both links.
-    let one = soft_1 * inertia_kg_m2.sum();
-    let two = soft_2 * inertia_kg_m2.m22;
-    1.0 / one.at_least(two).square_root()
-}
-
 impl<L: Law> Default for Configuration<L> {
     /// The paper's arm at 1 kHz with converters of common resolution.
     fn default() -> Self {
@@ -177,11 +165,18 @@ impl<L: Law> Configuration<L> {
 
     /// Returns the speed of tracking loops and law on this arm, at most 1, as a factor on what their settings say.
     ///
-    /// Behind known elastic gears the tracking loops stay below the arm's natural frequency, because the torque moves
-    /// the encoders.
+    /// Behind known elastic gears the tracking loops stay below the lower of the natural frequencies of the stretched arm
+    /// about either joint, behind motors at rest: 1/√(c J), infinite for stiff gears. The torque moves the encoders there.
+    /// The inertia J contains the joint's rotor, as the arm's model does, although it is at rest: loops behind heavy
+    /// rotors are slower than they need be.
     pub fn loop_speed(&self, arm: &Arm<f32>) -> f32 {
         let estimator = &self.settings.estimator;
-        let natural_rad_s = natural_frequency_rad_s(arm, estimator.gear_compliance_rad_nm);
+        let inertia_kg_m2 = arm.mass_matrix(&Pose::new(&LinkMotion::zeros()));
+        let [soft_1, soft_2] = estimator.gear_compliance_rad_nm;
+        // Joint 1 turns both links.
+        let one = soft_1 * inertia_kg_m2.sum();
+        let two = soft_2 * inertia_kg_m2.m22;
+        let natural_rad_s = 1.0 / one.at_least(two).square_root();
         (natural_rad_s / estimator.bandwidth_rad_s).at_most(1.0)
     }
 
