@@ -92,9 +92,8 @@ pub struct ResponseEstimator {
     withheld_n: f32,
     /// Last change of force that was commanded in addition to the law's, N.
     excitation_n: f32,
-    /// Probe in the torque that acts, and the one for the next torque, N, with the random numbers from which it is drawn.
+    /// Probe in the torque that acts, N, and the random numbers from which the next one is drawn.
     acting_probe_n: f32,
-    probe_n: f32,
     random: u16,
     /// Expected changes of force, N, the latest first.
     expected_n: [f32; DELAYS + 1],
@@ -110,10 +109,9 @@ pub struct ResponseEstimator {
     width: f32,
     /// Fraction of the observers' full gain that the lower bound allows.
     gain: f32,
-    /// How compliant the contact is, from the upper bound.
-    give: f32,
-    /// How certainly it is not rigid, from the upper bound of second differences.
-    lags: f32,
+    /// What the bounds allow, without the share of the loops, which p decides; `give` is from the upper bound of first
+    /// differences, `lags` from that of second ones.
+    allowed: ContactResponse,
     /// Time in contact without a pause, s.
     touched_s: f32,
 }
@@ -127,13 +125,6 @@ struct Moments {
     expected: f32,
     /// Square of the measured difference.
     measured: f32,
-}
-
-/// An estimate of ρ.
-struct Uncertain {
-    response: f32,
-    /// Its standard deviation.
-    deviation: f32,
 }
 
 impl Moments {
@@ -158,19 +149,16 @@ impl Moments {
         self.measured += weight * (sums.measured - self.measured);
     }
 
-    /// Returns ρ from averages of turns whose squared weights have this sum.
+    /// Returns ρ from averages of turns whose squared weights have this sum, and the distance of its bounds.
     #[inline(never)]
-    fn response(&self, spread: f32) -> Uncertain {
+    fn response(&self, spread: f32) -> (f32, f32) {
         let largest = |most: f32, product: &f32| product.at_least(most);
         let most = self.products.iter().fold(0.0, largest);
         // Not zero where nothing was expected: the response is then unknown.
         let square = self.expected.at_least(1e-12);
         let variance = spread * self.measured * square;
         let deviation = (variance / Turn::COUNT).square_root() / square;
-        Uncertain {
-            response: most / square,
-            deviation,
-        }
+        (most / square, DEVIATIONS * deviation)
     }
 }
 
@@ -202,9 +190,7 @@ impl ResponseEstimator {
         };
         ContactResponse {
             loop_share: EACH_LOOP * share.limited(0.0, p_ratio.at_least(0.0)),
-            give: self.give,
-            lags: self.lags,
-            probe_n: self.probe_n,
+            ..self.allowed
         }
     }
 
@@ -230,8 +216,7 @@ impl ResponseEstimator {
         self.force_n = normal_force_n;
         self.change_n = change_n;
         self.touched_s += self.tick_s;
-        self.acting_probe_n = self.probe_n;
-        self.probe_n = 0.0;
+        self.acting_probe_n = core::mem::take(&mut self.allowed.probe_n);
         if self.touched_s < SETTLING_S {
             return;
         }
@@ -269,12 +254,12 @@ impl ResponseEstimator {
         }
         let averages = self.averages.each_ref();
         let [first, second] = averages.map(|it| it.response(self.spread));
-        self.width = 2.0 * DEVIATIONS * first.deviation;
-        self.gain = (first.response - DEVIATIONS * first.deviation) / RIGID;
-        let upper = first.response + DEVIATIONS * first.deviation;
-        self.give = (1.0 - upper / (DAMPED * RIGID)).at_least(0.0);
-        let upper = second.response + DEVIATIONS * second.deviation;
-        self.lags = (2.0 - 2.0 * upper / RIGID).limited(0.0, 1.0);
+        let (response, distance) = first;
+        self.width = 2.0 * distance;
+        self.gain = (response - distance) / RIGID;
+        self.allowed.give = (1.0 - (response + distance) / (DAMPED * RIGID)).at_least(0.0);
+        let (response, distance) = second;
+        self.allowed.lags = (2.0 - 2.0 * (response + distance) / RIGID).limited(0.0, 1.0);
     }
 
     /// Skips a tick without information: in the air, or with a reading in doubt.
@@ -283,9 +268,9 @@ impl ResponseEstimator {
         if self.touched_s != 0.0 {
             self.touched_s = 0.0;
             self.acting_probe_n = 0.0;
-            self.probe_n = 0.0;
+            self.allowed.probe_n = 0.0;
             // What the contact is stays known; the law's damping begins anew from the force after the pause.
-            self.give = 0.0;
+            self.allowed.give = 0.0;
         }
     }
 
@@ -295,11 +280,8 @@ impl ResponseEstimator {
     fn draw_probe(&mut self, amplitude_n: f32) {
         let feedback = if self.random & 1 == 1 { 0xb400 } else { 0 };
         self.random = (self.random >> 1) ^ feedback;
-        self.probe_n = if self.random & 1 == 1 {
-            amplitude_n
-        } else {
-            -amplitude_n
-        };
+        let sign = if self.random & 1 == 1 { 1.0 } else { -1.0 };
+        self.allowed.probe_n = sign * amplitude_n;
     }
 }
 

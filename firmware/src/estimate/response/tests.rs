@@ -41,7 +41,7 @@ fn observed_by(
         }
         let next = rounding_n * noise(3 * tick + 1);
         commanded = 10.0 + next - withheld + probe_n;
-        (withheld, probe_n) = (next, estimator.probe_n);
+        (withheld, probe_n) = (next, estimator.allowed.probe_n);
     }
     estimator.response(P_PER_KG, P_RATIO)
 }
@@ -131,7 +131,7 @@ fn all_is_allowed_if_it_is_off() {
 /// Passes readings without a change to an estimator, and counts the ticks until it probes.
 fn ticks_until_probe(estimator: &mut ResponseEstimator) -> u8 {
     let mut ticks = 0;
-    while estimator.probe_n == 0.0 {
+    while estimator.allowed.probe_n == 0.0 {
         estimator.update(10.0, 0.0, 1);
         ticks += 1;
     }
