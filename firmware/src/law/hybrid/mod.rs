@@ -164,17 +164,15 @@ impl HybridSettings {
             let limit = FORCE_INTEGRAL_PART * wanted_n;
             state.force_integral_n = (state.force_integral_n + step).within(limit);
         }
-        let response = &input.contact.response;
-        let damping_n = if response.give > 0.0 {
-            // Press less while the force rises: this damps a compliant contact.
+        let (response, force_n) = (&input.contact.response, input.contact.force_n.y);
+        if response.give > 0.0 {
             let rate = input.tick_s * DAMPING_RAD_S;
-            state.slow_force_n +=
-                rate / (1.0 + rate) * (input.contact.force_n.y - state.slow_force_n);
-            self.contact_damping * response.give * (input.contact.force_n.y - state.slow_force_n)
+            state.slow_force_n += rate / (1.0 + rate) * (force_n - state.slow_force_n);
         } else {
-            state.slow_force_n = input.contact.force_n.y;
-            0.0
-        };
+            state.slow_force_n = force_n;
+        }
+        // Press less while the force rises: this damps a compliant contact.
+        let damping_n = self.contact_damping * response.give * (force_n - state.slow_force_n);
         wanted_n + state.force_integral_n - damping_n + response.probe_n
     }
 
