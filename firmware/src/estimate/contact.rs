@@ -101,13 +101,9 @@ impl ContactDetector {
             (GAP_SLOPE * (1.0 - encoders.gap_m / encoders.gap_error_m)).limited(-CERTAIN, GAP_FOR);
         let release = ((0.5 * encoders.full_release - encoders.release) / INNOVATION_VARIANCE)
             .limited(-CERTAIN, 0.0);
-        let change = gap + release;
         // Unchanged readings add no evidence against contact.
-        self.weigh(if encoders.moved {
-            change
-        } else {
-            change.at_least(0.0)
-        })
+        let least = if encoders.moved { f32::MIN } else { 0.0 };
+        self.weigh((gap + release).at_least(least))
     }
 
     /// Adds to the log-odds and updates the decision.
@@ -131,12 +127,8 @@ impl ContactDetector {
 
     /// Returns the certainty of the decision: 0 where it changes, 1 where it is certain.
     pub fn confidence(&self) -> f32 {
-        let toward = if self.contact {
-            self.log_odds
-        } else {
-            -self.log_odds
-        };
-        ((toward + DECISION) / (CERTAIN + DECISION)).at_least(0.0)
+        let sign = if self.contact { 1.0 } else { -1.0 };
+        ((sign * self.log_odds + DECISION) / (CERTAIN + DECISION)).at_least(0.0)
     }
 }
 
