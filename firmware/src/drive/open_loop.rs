@@ -74,7 +74,13 @@ impl OpenLoop {
             Some(start) if self.has_moved_far(start, frame.joints) => {
                 supervisor.latch(Fault::MovedTooFar);
             }
-            Some(_) => Self::note_lapses(supervisor, frame.inputs, is_readable),
+            Some(_) => {
+                // Forces are not needed here.
+                supervisor.note(Lapse::EncoderOutOfRange, u32::from(!is_readable));
+                for (input, lapse) in BOARD_LAPSES {
+                    supervisor.note(lapse, u32::from(frame.inputs.contains(input)));
+                }
+            }
             // A missing reading shows no motion from it.
             None if is_readable => self.armed_at = Some(frame.joints),
             None => {}
@@ -103,14 +109,6 @@ impl OpenLoop {
             let turned = encoder.difference(from, to).unsigned_abs();
             encoder.contains(to) && turned > encoder.modulus() / FARTHEST
         })
-    }
-
-    /// Notes lapses of a frame. Forces are not needed here.
-    fn note_lapses(supervisor: &mut Supervisor, inputs: DigitalInputs, is_readable: bool) {
-        supervisor.note(Lapse::EncoderOutOfRange, u32::from(!is_readable));
-        for (input, lapse) in BOARD_LAPSES {
-            supervisor.note(lapse, u32::from(inputs.contains(input)));
-        }
     }
 }
 

@@ -144,9 +144,8 @@ impl<D: Drive, L: Law> ControlTask<D, L> {
         self.source = source;
         self.counts = TaskCounts::default();
         self.controller = Some(Controller::new(configuration)?);
-        if source == FrameSource::Commissioning {
-            self.open_loop = Some(OpenLoop::new(configuration));
-        }
+        let is_open = source == FrameSource::Commissioning;
+        self.open_loop = is_open.then(|| OpenLoop::new(configuration));
         Ok(())
     }
 
