@@ -390,3 +390,39 @@ fn bad_configurations_are_named() {
     bad.arm.height_m = 0.42;
     assert_eq!(Controller::new(&bad).unwrap_err().key, "arm.height_m");
 }
+
+painleve_shared::settings! {
+    /// A law that expects a force beyond all measure, which is finite.
+    #[derive(Copy)]
+    pub struct Boundless {
+        /// Force.
+        force_n: f32 = 1e38, 0.0..=2e38, "N";
+    }
+}
+
+impl Law for Boundless {
+    type State = ();
+
+    fn tick(&self, _: &mut (), _: &crate::law::LawInput<'_>) -> crate::law::LawOutput {
+        crate::law::LawOutput {
+            contact_force_n: nalgebra::Vector2::new(0.0, self.force_n),
+            ..Default::default()
+        }
+    }
+}
+
+#[test]
+fn a_force_beyond_all_measure_latches_a_fault_and_leaves_the_estimates() {
+    let configuration = Configuration::<Boundless>::default();
+    let mut controller = Controller::new(&configuration).unwrap();
+    controller.tick(&SensorFrame {
+        inputs: DigitalInputs::default(),
+        ..frame(0)
+    });
+    let before = controller.estimates.model.theta_rad;
+    let answer = controller.tick(&frame(1));
+    assert_eq!(answer.latched_fault(), Some(Fault::NotFinite));
+    controller.tick(&frame(2));
+    let turned = controller.estimates.model.theta_rad - before;
+    assert!(turned.amax() < 1e-3, "{turned:?}");
+}
