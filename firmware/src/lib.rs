@@ -11,7 +11,7 @@
 //! counts to angles, rates, contact and friction; [`supervise`] decides which actions are allowed;
 //! [`refer`] gives the target position of the tip; [`demand`] computes torques, with the [`law`] or,
 //! to return a thrown tip to the belt, with [`recover`]; [`torque_output`] limits
-//! them. [`telemetry`] exposes the internal state. [`drive`] runs the
+//! them. [`drive`] runs the
 //! ticks on the hardware.
 
 #![no_std]
@@ -30,7 +30,6 @@ pub mod recover;
 pub mod refer;
 pub mod schedule;
 pub mod supervise;
-pub mod telemetry;
 #[cfg(test)]
 mod test_readings;
 pub mod torque_output;
@@ -45,4 +44,3 @@ pub const SOURCES: u64 = match u64::from_str_radix(env!("PAINLEVE_SOURCES"), 16)
 pub use configuration::Configuration;
 pub use controller::Controller;
 pub use painleve_shared::{OutOfRange, counts, frame, status};
-pub use telemetry::Telemetry;

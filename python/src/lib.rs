@@ -1,12 +1,12 @@
 //! Plant, controller and runs for Python. The package `painleve` exports them.
 
-use painleve_firmware::telemetry::Telemetry;
 use painleve_plant::closed_loop::{ClosedLoop, LoopError, Monitor};
 use painleve_plant::controller_host::InProcess;
 use painleve_plant::mechanics::BuiltInPlant;
 use painleve_plant::sample::Sample;
 use painleve_plant::scenario::Scenario;
 use painleve_plant::simulation::Simulation;
+use painleve_plant::telemetry::Telemetry;
 use painleve_plant::{Plant, Snapshot};
 use painleve_record::RecordedTick;
 use painleve_record::fields::{ESTIMATES, PLANT, Read, RecordField, TOPICS};
@@ -370,9 +370,7 @@ impl PyController {
             tangential_force: ForceCounts(tangential),
             inputs: DigitalInputs(inputs),
         };
-        let answer = self
-            .controller
-            .tick_with_telemetry(&frame, &mut self.telemetry);
+        let answer = self.telemetry.tick(&mut self.controller, &frame);
         let [u1, u2] = answer.torques.map(|torque| torque.0);
         (
             answer.tick,

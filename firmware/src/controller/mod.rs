@@ -11,8 +11,7 @@
 //! Wittenmark, Computer-Controlled Systems, 3rd edition, chapter 9).
 //!
 //! Each stage holds its settings, which never change, and its state; the stages' signatures show the
-//! data flow between them. At the end of a tick its results are written to the telemetry, on which
-//! nothing depends.
+//! data flow between them.
 
 mod arrival;
 mod stages;
@@ -38,13 +37,12 @@ use crate::estimate::response::ResponseEstimator;
 use crate::estimate::{ContactEstimate, Estimators, Observed};
 use crate::last_command::LastCommand;
 use crate::law::{Law, LawSettings};
-use crate::refer::References;
 use crate::refer::governor::EdgeGovernor;
 use crate::refer::reference::ReferenceGenerator;
+use crate::refer::{References, Target};
 use crate::schedule::Turn;
 use crate::supervise::lapses::{Lapse, LapseMonitor};
 use crate::supervise::supervisor::Supervisor;
-use crate::telemetry::Telemetry;
 use crate::torque_output::TorqueOutput;
 
 /// The controller of one arm, with the laws `L`.
@@ -188,13 +186,14 @@ impl<L: Law> Controller<L> {
         self.last_answer
     }
 
-    /// Answers one sensor frame, updates the state for the next one, and writes the internal state to the telemetry.
-    pub fn tick_with_telemetry(
+    /// Answers one sensor frame, updates the state for the next one, and shows what the answer followed from, for logs and
+    /// displays; of a tick without new readings, nothing.
+    pub fn tick_and_show(
         &mut self,
         frame: &SensorFrame,
-        telemetry: &mut Telemetry,
+        show: impl FnOnce(&Estimators, &Target, &LastCommand),
     ) -> ActuatorFrame {
-        self.answer_into(frame, Some(telemetry));
+        self.answer_and_show(frame, show);
         self.update();
         self.last_answer
     }
@@ -203,7 +202,7 @@ impl<L: Law> Controller<L> {
     /// [`update`](Self::update).
     #[inline(never)]
     pub fn answer(&mut self, frame: &SensorFrame) -> &ActuatorFrame {
-        self.answer_into(frame, None);
+        self.answer_and_show(frame, |_, _, _| {});
         &self.last_answer
     }
 
@@ -237,7 +236,7 @@ impl<L: Law> Controller<L> {
     #[inline]
     pub fn note(&mut self, lapse: Lapse, times: u32) -> Option<ActuatorFrame> {
         self.supervisor.note(lapse, times).then(|| {
-            self.stop(None);
+            self.stop();
             self.last_answer
         })
     }
@@ -253,12 +252,16 @@ impl<L: Law> Controller<L> {
     }
 
     #[inline]
-    fn answer_into(&mut self, frame: &SensorFrame, telemetry: Option<&mut Telemetry>) {
+    fn answer_and_show(
+        &mut self,
+        frame: &SensorFrame,
+        show: impl FnOnce(&Estimators, &Target, &LastCommand),
+    ) {
         if !matches!(self.due, Due::Nothing) {
             self.catch_up();
         }
         match self.arrive(frame) {
-            Arrival::After(elapsed_ticks) => self.follow(frame, elapsed_ticks, telemetry),
+            Arrival::After(elapsed_ticks) => self.follow(frame, elapsed_ticks, show),
             // Without new readings, the last torque stays for a limited number of ticks.
             arrival => {
                 let supervisor = &mut self.supervisor;
@@ -269,7 +272,7 @@ impl<L: Law> Controller<L> {
                     }
                 }
                 if !supervisor.drives() {
-                    self.stop(telemetry);
+                    self.stop();
                 }
             }
         }
@@ -280,7 +283,7 @@ impl<L: Law> Controller<L> {
     /// Takes the torque off without a tick.
     #[cold]
     #[inline(never)]
-    fn stop(&mut self, telemetry: Option<&mut Telemetry>) {
+    fn stop(&mut self) {
         self.release();
         let answer = &mut self.last_answer;
         answer.torques = [TorqueCounts(0); 2];
@@ -288,8 +291,5 @@ impl<L: Law> Controller<L> {
         answer
             .flags
             .remove(StatusFlags::SATURATED | StatusFlags::AT_EDGE | StatusFlags::RECOVERING);
-        if let Some(telemetry) = telemetry {
-            telemetry.stop();
-        }
     }
 }

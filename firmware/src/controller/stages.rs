@@ -6,11 +6,12 @@ use painleve_shared::frame::{SensorFrame, StatusFlags};
 use painleve_shared::status::Fault;
 
 use super::{Controller, Due};
+use crate::estimate::Estimators;
 use crate::estimate::joints::Restart;
 use crate::last_command::LastCommand;
 use crate::law::Law;
+use crate::refer::Target;
 use crate::schedule::Turn;
-use crate::telemetry::Telemetry;
 
 impl<L: Law> Controller<L> {
     /// Answers a frame's readings, `elapsed_ticks` after the previous ones.
@@ -19,7 +20,7 @@ impl<L: Law> Controller<L> {
         &mut self,
         frame: &SensorFrame,
         elapsed_ticks: u32,
-        telemetry: Option<&mut Telemetry>,
+        show: impl FnOnce(&Estimators, &Target, &LastCommand),
     ) {
         let followed = self.estimates.observe(frame, elapsed_ticks, &self.command);
         if followed == Err(Restart::EncoderJump) {
@@ -63,9 +64,7 @@ impl<L: Law> Controller<L> {
         flags.set(StatusFlags::STICKS, touches && friction.sticks);
         answer.flags = flags;
         self.supervisor.report(answer);
-        if let Some(telemetry) = telemetry {
-            telemetry.record(estimates, &target, command, recovers);
-        }
+        show(estimates, &target, command);
         // Readings from which the estimates have started show nothing else.
         self.due = match followed {
             Ok(()) => Due::Everything,

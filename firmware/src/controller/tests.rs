@@ -3,6 +3,7 @@
 use super::*;
 use crate::configuration::ControllerSettings;
 use crate::estimate::contact::Evidence;
+use crate::refer::governor::Stretch;
 use crate::refer::reference::{Program, Segment};
 use crate::supervise::lapses::{Lapse, LapseLimits};
 use crate::test_readings::pressing as frame;
@@ -21,18 +22,9 @@ fn configuration() -> Configuration {
 }
 
 fn run(controller: &mut Controller, ticks: core::ops::Range<u32>) -> ActuatorFrame {
-    run_with_telemetry(controller, ticks).0
-}
-
-fn run_with_telemetry(
-    controller: &mut Controller,
-    ticks: core::ops::Range<u32>,
-) -> (ActuatorFrame, Telemetry) {
-    let mut telemetry = Telemetry::default();
-    let answer = ticks.fold(ActuatorFrame::default(), |_, tick| {
-        controller.tick_with_telemetry(&frame(tick), &mut telemetry)
-    });
-    (answer, telemetry)
+    ticks.fold(ActuatorFrame::default(), |_, tick| {
+        controller.tick(&frame(tick))
+    })
 }
 
 fn tracking() -> Controller {
@@ -73,19 +65,21 @@ fn an_update_that_is_due_is_done_before_the_next_answer() {
 fn what_is_learnt_does_not_depend_on_the_numbers_of_the_ticks() {
     let after = |number: fn(u32) -> u32| {
         let mut controller = Controller::new(&configuration()).unwrap();
-        let mut telemetry = Telemetry::default();
+        let mut shown = None;
         for sequence in 0..300 {
             let frame = SensorFrame {
                 tick: number(sequence),
                 ..frame(sequence)
             };
-            controller.tick_with_telemetry(&frame, &mut telemetry);
+            controller.tick_and_show(&frame, |estimates, target, command| {
+                shown = Some((target.stretch, estimates.contact.friction, *command));
+            });
         }
-        telemetry
+        shown.unwrap()
     };
     let usual = after(|sequence| sequence);
-    let [lower_m, upper_m] = usual.edges_m;
-    assert!(lower_m < -0.17 && upper_m < 0.17, "{:?}", usual.edges_m);
+    let Stretch { lower_m, upper_m } = usual.0;
+    assert!(lower_m < -0.17 && upper_m < 0.17, "{:?}", usual.0);
     for number in [|_| 0, |_| 1, |sequence| 3 * sequence + 1] {
         assert_eq!(after(number), usual);
     }
@@ -262,16 +256,15 @@ fn a_sender_that_starts_anew_resets_the_fault_and_arms() {
 }
 
 #[test]
-fn torque_is_limited_and_counted() {
+fn torque_is_limited() {
     let mut limited = configuration();
     // Less torque than holding the arm takes, so that pressing less does not help.
     limited.settings.torque_limit_nm = 0.05;
     let mut controller = Controller::new(&limited).unwrap();
-    let (answer, telemetry) = run_with_telemetry(&mut controller, 0..20);
+    let answer = run(&mut controller, 0..20);
     assert!(answer.flags.contains(StatusFlags::SATURATED));
     let limit = (0.05 / limited.converters.torque.per_count()).round() as i32;
     assert!(answer.torques.iter().all(|torque| torque.0.abs() <= limit));
-    assert!(telemetry.saturated && telemetry.saturated_ticks > 10);
 }
 
 #[test]
@@ -281,10 +274,12 @@ fn the_tip_is_pressed_less_where_torque_is_short() {
     // A force that never follows the torque would be that of a compliant contact.
     limited.settings.response.enabled = false;
     let mut controller = Controller::new(&limited).unwrap();
-    let (answer, telemetry) = run_with_telemetry(&mut controller, 0..200);
-    assert_ne!(answer.torques, [TorqueCounts(0); 2]);
-    assert_eq!(telemetry.saturated_ticks, 0);
-    let largest_nm = telemetry.torque_nm.amax();
+    for tick in 0..200 {
+        let answer = controller.tick(&frame(tick));
+        assert_ne!(answer.torques, [TorqueCounts(0); 2]);
+        assert!(!answer.flags.contains(StatusFlags::SATURATED));
+    }
+    let largest_nm = controller.command.torque_nm.amax();
     // All of the torque is used, to the last count.
     let count_nm = configuration().converters.torque.converter().per_count;
     assert!((1.5 - largest_nm).abs() <= 1.01 * count_nm, "{largest_nm}");
@@ -301,22 +296,22 @@ fn the_reference_waits_where_a_thrown_tip_has_left_it() {
     let mut controller = Controller::new(&configuration).unwrap();
     // The tip is 0.26 m away, and the governor catches up.
     run(&mut controller, 0..100);
-    let mut telemetry = Telemetry::default();
     let references_m = (100..200).filter_map(|tick| {
         let in_the_air = SensorFrame {
             normal_force: ForceCounts(0),
             tangential_force: ForceCounts(0),
             ..frame(tick)
         };
-        controller.tick_with_telemetry(&in_the_air, &mut telemetry);
-        telemetry.recovering.then_some(telemetry.reference_m)
+        let answer = controller.tick(&in_the_air);
+        let recovers = answer.flags.contains(StatusFlags::RECOVERING);
+        recovers.then_some(answer.reference_tip)
     });
-    let references_m: std::vec::Vec<f32> = references_m.collect();
+    let references_m: std::vec::Vec<_> = references_m.collect();
     assert!(references_m.len() > 50, "{references_m:?}");
     assert!(
         references_m
             .iter()
-            .all(|it| *it == references_m[0] && *it < 0.0)
+            .all(|it| *it == references_m[0] && it.0 < 0)
     );
 }
 

@@ -66,7 +66,8 @@ pub struct Estimators {
     /// The arm with its calibrated length.
     pub arm: Arm<f32>,
     pub(crate) joints: JointEstimator,
-    pub(crate) detector: ContactDetector,
+    /// The contact decision.
+    pub detector: ContactDetector,
     pub(crate) friction_filter: FrictionEstimator,
     pub(crate) belt: BeltEstimator,
     pub(crate) force_cell: LinearConverter<f32>,

@@ -13,6 +13,7 @@
 //! - [`closed_loop`]: sample, exchange, record, advance
 //! - [`sample`]: both frames of a tick and the plant's true state, for records
 //! - [`statistics`]: counts and extremes of a run
+//! - [`telemetry`]: the controller's internal state at its last tick
 
 pub mod belt_line;
 pub mod closed_loop;
@@ -28,6 +29,7 @@ pub mod scenario;
 pub mod simulation;
 pub mod smoothness;
 pub mod statistics;
+pub mod telemetry;
 mod tick_clock;
 
 use law_choice::LawChoice;

@@ -13,9 +13,9 @@ use std::thread::{self, JoinHandle};
 
 use painleve_chart::picture::PictureError;
 use painleve_files::atomic_file::{AtomicFile, AtomicFileError, commit_all};
-use painleve_firmware::telemetry::Telemetry;
 use painleve_plant::closed_loop::{LoopError, Monitor};
 use painleve_plant::sample::Sample;
+use painleve_plant::telemetry::Telemetry;
 use painleve_plant::{Configuration, Event};
 
 use crate::events::{ControllerEvents, EventKind, RunEvent};

@@ -6,8 +6,8 @@
 //! compared with the recorded ones at every tick. If they differ, the other controller is not of
 //! this build or has lost ticks in real time, and its estimates are unknown.
 
-use painleve_firmware::telemetry::Telemetry;
 use painleve_plant::sample::Sample;
+use painleve_plant::telemetry::Telemetry;
 use painleve_plant::{Configuration, Controller};
 use painleve_shared::frame::ActuatorFrame;
 
@@ -33,9 +33,7 @@ impl Replica {
         if !sample.delivered {
             return true;
         }
-        let answer = self
-            .controller
-            .tick_with_telemetry(&sample.sensor, &mut self.telemetry);
+        let answer = self.telemetry.tick(&mut self.controller, &sample.sensor);
         !sample.answered || essence(&answer) == essence(&sample.actuator)
     }
 

@@ -7,8 +7,8 @@ use std::mem;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
 
-use painleve_firmware::telemetry::Telemetry;
 use painleve_plant::sample::Sample;
+use painleve_plant::telemetry::Telemetry;
 use painleve_record::events::RunEvent;
 use painleve_record::scene::Scene;
 use serde_json::{Value, json};

@@ -117,7 +117,7 @@ impl Row {
     /// Creates the row of a tick.
     pub fn new(tick: &RecordedTick<'_>, followed: Followed) -> Self {
         let (plant, answer) = (&tick.sample.plant, &tick.sample.actuator);
-        let estimates = |read: fn(&painleve_firmware::telemetry::Telemetry) -> f32| {
+        let estimates = |read: fn(&painleve_plant::telemetry::Telemetry) -> f32| {
             tick.estimates.map_or(f32::NAN, read)
         };
         let [theta_1, theta_2] = plant.theta_rad.to_array();

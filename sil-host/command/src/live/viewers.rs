@@ -4,11 +4,11 @@ use std::cell::Cell;
 use std::rc::Rc;
 use std::sync::Arc;
 
-use painleve_firmware::telemetry::Telemetry;
 use painleve_plant::closed_loop::{LoopError, Monitor};
 use painleve_plant::controller_host::{Answer, ControllerHost, HostError};
 use painleve_plant::sample::Sample;
 use painleve_plant::scenario::Scenario;
+use painleve_plant::telemetry::Telemetry;
 use painleve_plant::{Controller, Event};
 use painleve_record::RecordedTick;
 use painleve_record::events::{ControllerEvents, EventKind, RunEvent};
@@ -34,7 +34,7 @@ impl ControllerHost for Host {
     fn exchange(&mut self, frame: &SensorFrame) -> Result<Answer, HostError> {
         let frame = if self.is_watched.get() {
             let mut telemetry = self.telemetry.get();
-            let answer = self.controller.tick_with_telemetry(frame, &mut telemetry);
+            let answer = telemetry.tick(&mut self.controller, frame);
             self.telemetry.set(telemetry);
             answer
         } else {

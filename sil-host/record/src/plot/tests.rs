@@ -1,9 +1,9 @@
 //! The pictures of sample runs: their texts, their panels and their bounds.
 
 use super::*;
-use painleve_firmware::telemetry::Telemetry;
 use painleve_plant::Snapshot;
 use painleve_plant::sample::Sample;
+use painleve_plant::telemetry::Telemetry;
 use painleve_shared::frame::ActuatorFrame;
 use painleve_shared::{Arm, JointTorque, LinkMotion, Pose, Slip};
 use proptest::prelude::*;

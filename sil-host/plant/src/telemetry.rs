@@ -1,14 +1,15 @@
 //! Internal state of the controller at its last tick, in SI units.
 
+use painleve_firmware::estimate::Estimators;
+use painleve_firmware::last_command::LastCommand;
+use painleve_firmware::refer::Target;
+use painleve_shared::frame::{ActuatorFrame, SensorFrame, StatusFlags};
 use painleve_shared::{JointTorque, LinkMotion, Slip};
 
-use crate::estimate::Estimators;
-use crate::last_command::LastCommand;
-use crate::refer::Target;
+use crate::Controller;
 
-/// A snapshot for logs and displays. No part of the controller's behaviour depends on it.
+/// A snapshot for logs and displays.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Telemetry {
     /// Estimated link angles θ1, θ2, rad.
     pub theta_rad: LinkMotion<f32>,
@@ -51,15 +52,22 @@ pub struct Telemetry {
 }
 
 impl Telemetry {
-    /// Writes the results of a tick.
-    #[inline]
-    pub(crate) fn record(
-        &mut self,
-        estimates: &Estimators,
-        target: &Target,
-        command: &LastCommand,
-        recovering: bool,
-    ) {
+    /// Runs a tick of the controller, and writes what it shows.
+    pub fn tick(&mut self, controller: &mut Controller, frame: &SensorFrame) -> ActuatorFrame {
+        let answer = controller.tick_and_show(frame, |estimates, target, command| {
+            self.record(estimates, target, command);
+        });
+        // A tick without new readings shows nothing, but may take the torque off.
+        if answer.torques.iter().all(|torque| torque.0 == 0) {
+            self.torque_nm = JointTorque::zeros();
+        }
+        self.at_edge = answer.flags.contains(StatusFlags::AT_EDGE);
+        self.recovering = answer.flags.contains(StatusFlags::RECOVERING);
+        self.saturated = answer.flags.contains(StatusFlags::SATURATED);
+        answer
+    }
+
+    fn record(&mut self, estimates: &Estimators, target: &Target, command: &LastCommand) {
         let (model, contact) = (&estimates.model, &estimates.contact);
         *self = Self {
             theta_rad: model.theta_rad,
@@ -77,18 +85,8 @@ impl Telemetry {
             slip: contact.friction.slip,
             sticks: contact.friction.sticks,
             edges_m: [target.stretch.lower_m, target.stretch.upper_m],
-            at_edge: target.at_edge,
-            recovering,
-            saturated: command.saturated,
             saturated_ticks: self.saturated_ticks.wrapping_add(command.saturated.into()),
+            ..Self::default()
         };
-    }
-
-    /// Records that the torque has been taken off without a tick.
-    pub(crate) fn stop(&mut self) {
-        self.torque_nm = JointTorque::zeros();
-        self.at_edge = false;
-        self.recovering = false;
-        self.saturated = false;
     }
 }
