@@ -81,10 +81,7 @@ impl<L: Law> Controller<L> {
         if touches {
             estimates.learn_in_contact(observed, turn);
         } else {
-            estimates.learn_in_the_air(observed);
-        }
-        if turn == Turn::Balance {
-            estimates.balance(observed);
+            estimates.learn_in_the_air(observed, turn);
         }
         // A tip that is being returned to the belt needs the edges soon.
         if turn == Turn::Edges || (!touches && self.references.asks_for_landing) {

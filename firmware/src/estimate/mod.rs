@@ -166,7 +166,7 @@ impl Estimators {
         force_n.x.abs() < range_n && force_n.y.abs() < range_n
     }
 
-    /// Updates friction, belt and response of a contact with the force at the last tick; the response in its turns.
+    /// Updates friction, belt and response of a contact with the force at the last tick, and what has this turn.
     #[inline]
     pub fn learn_in_contact(&mut self, observed: &Observed, turn: Turn) {
         let is_informative = self.add_to_balance(observed);
@@ -196,11 +196,20 @@ impl Estimators {
         } else {
             self.response.pause();
         }
+        if turn == Turn::Balance {
+            self.balance_torques();
+            // The gap of a tip that certainly touches shows the links' length. An unchanged reading would gain weight
+            // merely with time.
+            if observed.drove && self.detector.is_certain() && self.joints.moved {
+                let gap_m = self.gap_m();
+                self.calibrator.update(&mut self.arm, gap_m);
+            }
+        }
     }
 
-    /// Updates friction and belt at a tick without contact.
+    /// Updates friction and belt at a tick without contact, and what has this turn.
     #[inline]
-    pub fn learn_in_the_air(&mut self, observed: &Observed) {
+    pub fn learn_in_the_air(&mut self, observed: &Observed, turn: Turn) {
         if self.contact.leaves {
             let at_rest = self.belt.slip_at_rest();
             self.friction_filter
@@ -211,6 +220,9 @@ impl Estimators {
             .update(tip_velocity_m_s, None, observed.elapsed_ticks);
         self.response.pause();
         self.add_to_balance(observed);
+        if turn == Turn::Balance {
+            self.balance_torques();
+        }
     }
 
     /// Adds a tick to the next update of the disturbance; returns whether force and torque show what the model does
@@ -266,20 +278,13 @@ impl Estimators {
         contact.response = response;
     }
 
-    /// Updates the disturbance and, in contact, the links' length.
+    /// Updates the disturbance.
     #[inline(never)]
-    pub fn balance(&mut self, observed: &Observed) {
-        let (model, contact) = (&self.model, &self.contact);
-        let p_ratio = contact.p_per_kg / model.q22_per_kg;
+    fn balance_torques(&mut self) {
+        let contact = &self.contact;
+        let p_ratio = contact.p_per_kg / self.model.q22_per_kg;
         let p_ratio = contact.touches.then_some(p_ratio);
-        self.disturbance
-            .update(model, p_ratio, contact.response.loop_share);
-        // The gap of a tip that certainly touches shows the links' length. An unchanged reading would gain weight
-        // merely with time.
-        let is_certain = contact.touches && self.detector.is_certain();
-        if observed.drove && is_certain && self.joints.moved {
-            let gap_m = self.gap_m();
-            self.calibrator.update(&mut self.arm, gap_m);
-        }
+        let loop_share = contact.response.loop_share;
+        self.disturbance.update(&self.model, p_ratio, loop_share);
     }
 }
