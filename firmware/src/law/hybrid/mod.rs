@@ -24,8 +24,6 @@ use self::allocation::Allocation;
 pub use self::settings::{FrictionFeedForward, HybridSettings};
 use super::{Law, LawInput, LawOutput};
 
-/// Largest correction by the integral of the force, as a part of f_n*.
-const FORCE_INTEGRAL_PART: f32 = 0.5;
 /// Part of the friction observer's rate that a compliant contact takes away. With 0.7, more belts that hang on 10⁴ N/m
 /// ring (lab book, *Torque*).
 const CALMER_OBSERVER: f32 = 0.85;
@@ -161,8 +159,7 @@ impl HybridSettings {
             let weight = (self.force_integral_gain_per_s * input.tick_s)
                 .at_most(input.contact.response.loop_share);
             let step = weight * (state.pressing * wanted_n - input.contact.force_n.y);
-            let limit = FORCE_INTEGRAL_PART * wanted_n;
-            state.force_integral_n = (state.force_integral_n + step).within(limit);
+            state.force_integral_n = (state.force_integral_n + step).within(wanted_n);
         }
         let (response, force_n) = (&input.contact.response, input.contact.force_n.y);
         if response.give > 0.0 {

@@ -49,7 +49,7 @@ settings! {
         /// which it rises; 1 for always f_n*, as in the paper.
         least_pressing: f32 = 0.1, 0.0..=1.0;
         /// Integral gain K'_I of the force; 0 for none. The paper's is 650 1/s elbow down and 0 elbow up. The integral
-        /// corrects by half of f_n* at most.
+        /// corrects by f_n* at most.
         force_integral_gain_per_s: f32 = 0.0, 0.0..=1e4, "1/s";
         /// Damping of a compliant contact, as a fraction of the change of force.
         contact_damping: f32 = 4.0, 0.0..=10.0;
