@@ -19,10 +19,13 @@ use painleve_shared::{Real, Slip, settings};
 
 use super::contact::ContactSettings;
 
-/// Square of the number of standard deviations by which a reading that is not noise differs: of another μ or, below the
-/// estimate, of a tip that may stick. This one threshold did as well as the rules it replaced (lab book, *Parts of the friction
-/// estimate left out*).
-const DIFFERENT_SQUARE: f32 = 64.0;
+/// Square of the number of standard deviations, four, beyond which something is not noise: the sign of a friction force, an
+/// average of innovations, a change of the innovation. A sudden change of μ is not noise: counted as such, it would hide the next
+/// one. No campaign shows it, a test does.
+const NO_NOISE_SQUARE: f32 = 16.0;
+/// The same, eight, of a single reading: of another μ or, below the estimate, of a tip that may stick. This one threshold did as
+/// well as the rules it replaced (lab book, *Parts of the friction estimate left out*).
+const DIFFERENT_SQUARE: f32 = 4.0 * NO_NOISE_SQUARE;
 
 /// Fraction of the estimated friction that indicates a slip in the opposite direction.
 const REVERSAL_FRACTION: f32 = 0.8;
@@ -39,12 +42,6 @@ const LEAST_NOISE: f32 = 0.01;
 
 /// Averaging time of the innovations, s.
 const MEAN_S: f32 = 0.02;
-/// Square of the number of standard deviations at which that average is significant.
-const SIGNIFICANT_SQUARE: f32 = 14.0;
-
-/// Largest square of a change of the innovation that counts as noise, as a multiple of the noise's. A sudden
-/// change of μ is not noise: counted as such, it would hide the next one. No campaign shows it, a test does.
-const NOISE_JUMP: f32 = 16.0;
 /// Ticks for which the torque misses a sudden change of μ: on average half a tick until a reading shows it,
 /// and one until the torque that it causes acts.
 const MISSED_TICKS: f32 = 1.5;
@@ -218,14 +215,14 @@ impl FrictionEstimator {
         let change = innovation - self.innovation;
         self.innovation = innovation;
         let least_variance = LEAST_NOISE * ratio_variance;
-        let most = NOISE_JUMP * (self.noise_variance + least_variance);
+        let most = NO_NOISE_SQUARE * (self.noise_variance + least_variance);
         // The difference of two innovations has twice the variance of one; its average takes four times as long.
         let square = (0.5 * change * change).at_most(most);
         self.noise_variance += 0.25 * weight * (square - self.noise_variance);
         let ratio_variance = self.noise_variance.limited(least_variance, ratio_variance);
         self.mean_innovation += weight * (innovation - self.mean_innovation);
         let square = self.mean_innovation * self.mean_innovation;
-        if square > SIGNIFICANT_SQUARE * (estimate.variance + ratio_variance) * weight {
+        if square > NO_NOISE_SQUARE * (estimate.variance + ratio_variance) * weight {
             estimate.variance = estimate.variance.at_least(square);
         }
     }
@@ -233,8 +230,8 @@ impl FrictionEstimator {
     #[inline(never)]
     fn observe_slip(&mut self, estimate: &mut FrictionEstimate, force_n: &Vector2<f32>) {
         let slip = Slip::of(-force_n.x);
-        // Below the noise level, three standard deviations, the sign carries no information.
-        let clear = force_n.x * force_n.x > 9.0 * self.force_variance_n2;
+        // Below the noise level the sign carries no information.
+        let clear = force_n.x * force_n.x > NO_NOISE_SQUARE * self.force_variance_n2;
         let cone_n = REVERSAL_FRACTION * estimate.coefficient * force_n.y;
         let contrary = clear && slip != estimate.slip && force_n.x.abs() >= cone_n;
         self.contrary_ticks = if contrary { self.contrary_ticks + 1 } else { 0 };
