@@ -2,7 +2,7 @@
 //!
 //! While the tip slides, −s f_t/f_n equals μ exactly, whatever the controller does: the ratio is
 //! not part of any loop. A scalar Kalman filter averages it. The variance is that of a ratio of
-//! noisy forces, σ² (1 + μ²)/f_n², and μ is modelled as a random walk.
+//! noisy forces, σ² (1 + μ²)/f_n², and what is known of μ is forgotten in the averaging time of the response.
 //!
 //! Readings without information about μ are skipped: in the air, at a small normal force, and in
 //! stick, where friction takes any value up to μ f_n in either direction. Stick is detected by a
@@ -18,6 +18,7 @@ use nalgebra::Vector2;
 use painleve_shared::{Real, Slip, settings};
 
 use super::contact::ContactSettings;
+use super::response::AVERAGING_S;
 
 /// Square of the number of standard deviations, four, beyond which something is not noise: the sign of a friction force, an
 /// average of innovations, a change of the innovation. A sudden change of μ is not noise: counted as such, it would hide the next
@@ -33,9 +34,6 @@ const REVERSAL_FRACTION: f32 = 0.8;
 /// Number of such ticks in a row that reverse the slip. Friction of a tip that bounces alternates: with one tick, four
 /// more of 300 arms were thrown too fast to be identified (lab book, *One contrary tick instead of three*).
 const REVERSAL_TICKS: u8 = 3;
-
-/// Random walk of μ, 1/√s.
-const DRIFT_PER_SQRT_S: f32 = 0.0005;
 
 /// Least variance of the noise of a ratio that is considered, as a part of the one that the force cell's noise gives.
 const LEAST_NOISE: f32 = 0.01;
@@ -98,9 +96,9 @@ pub struct FrictionEstimator {
     /// Normal force below which friction is not observed, N.
     observable_n: f32,
     force_variance_n2: f32,
-    /// Largest variance of μ, at the start and whenever the filter restarts, and its growth in one tick.
+    /// Largest variance of μ, at the start and whenever the filter restarts, and the factor by which it grows in one tick.
     first_variance: f32,
-    drift_variance: f32,
+    forgetting: f32,
     /// Weight of one innovation in their average.
     mean_weight: f32,
     /// Ticks in a row that indicate a slip in the opposite direction.
@@ -138,7 +136,7 @@ impl FrictionEstimator {
             observable_n: cell.contact_n,
             force_variance_n2,
             first_variance,
-            drift_variance: square(DRIFT_PER_SQRT_S) * tick_s,
+            forgetting: 1.0 + tick_s / AVERAGING_S,
             mean_weight: tick_s / (MEAN_S + tick_s),
             slip_in_doubt: true,
             noise_variance: 1.0,
@@ -194,8 +192,7 @@ impl FrictionEstimator {
             self.adapt(estimate, correction, force_n.y);
         }
         estimate.catch_up = 0.0;
-        let variance = estimate.variance + self.drift_variance;
-        estimate.variance = variance.at_most(self.first_variance);
+        estimate.variance = estimate.variance.at_most(self.first_variance);
         self.reading_variance_n2 =
             self.force_variance_n2 * (1.0 + estimate.coefficient * estimate.coefficient);
         // A reading that could decide has been considered before its tick was answered.
@@ -209,7 +206,7 @@ impl FrictionEstimator {
     fn adapt(&mut self, estimate: &mut FrictionEstimate, correction: Correction, normal_n: f32) {
         let innovation = correction.innovation;
         let ratio_variance = self.reading_variance_n2 / (normal_n * normal_n);
-        estimate.variance *= 1.0 - correction.gain;
+        estimate.variance *= (1.0 - correction.gain) * self.forgetting;
         // Innovations that keep their sign are not noise: μ has changed.
         let weight = self.mean_weight;
         let change = innovation - self.innovation;

@@ -31,8 +31,8 @@ settings! {
     }
 }
 
-/// Averaging time of the correlation, s.
-const AVERAGING_S: f32 = 0.25;
+/// Averaging time of the correlation and of the friction coefficient, s.
+pub const AVERAGING_S: f32 = 0.25;
 /// Number of standard deviations from the estimated response to its bounds.
 const DEVIATIONS: f32 = 3.0;
 /// Lower bound of the response above which the contact is taken to be rigid, and the observers have their full gain.
