@@ -33,10 +33,9 @@ const SEARCHING: f32 = 4.0;
 /// Speed at which the landing point moves along the belt to the admissible stretch, m/s. At once, a tip was thrown along the
 /// belt (lab book, *The way to the landing point*).
 const TRAVEL_M_S: f32 = 0.5;
-/// Rate at which the landing point moves inwards while the path is out of reach, 1/s.
-const INWARDS_PER_S: f32 = 0.5;
-/// Rate at which the path moves on while friction of the joints holds the tip short of its landing point, 1/s.
-const ONWARDS_PER_S: f32 = 5.0;
+/// Rate at which the landing point moves inwards while the path is out of reach, and at which the path moves on while friction
+/// of the joints holds the tip short of its landing point, 1/s.
+const YIELDING_PER_S: f32 = 2.0;
 
 settings! {
     /// Settings of the recovery.
@@ -123,7 +122,7 @@ impl RecoverySettings {
             false
         };
         if rests {
-            let onwards_m = ONWARDS_PER_S * tick_s * away;
+            let onwards_m = YIELDING_PER_S * tick_s * away;
             flight.beyond_m = (flight.beyond_m + onwards_m).within(FARTHEST_M);
         }
         // Descend faster at greater height, and at landing speed close to the belt.
@@ -147,7 +146,7 @@ impl RecoverySettings {
         let distance_m = wanted_m.norm_squared().square_root();
         let excess = (distance_m / (USABLE_REACH * arm.reach_m())).at_least(1.0);
         if excess > 1.0 {
-            flight.landing_m *= 1.0 - tick_s * INWARDS_PER_S;
+            flight.landing_m *= 1.0 - tick_s * YIELDING_PER_S;
         }
         let path_rad = arm
             .link_angles_rad(&(wanted_m / excess), flight.posture)
