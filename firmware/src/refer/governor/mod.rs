@@ -18,10 +18,11 @@ use painleve_shared::{Arm, Posture, Real};
 use self::search::Search;
 pub use self::settings::GovernorSettings;
 use crate::estimate::friction::FrictionEstimate;
+use crate::estimate::model::STRAIGHT_ARM_SINE;
 use crate::refer::reference::TipReference;
 
 /// Fraction of the reach in use: beyond it the arm is almost straight.
-pub const USABLE_REACH: f32 = 0.995;
+pub const USABLE_REACH: f32 = 1.0 - 0.5 * STRAIGHT_ARM_SINE * STRAIGHT_ARM_SINE;
 
 /// A reference farther than this from the last one, m, counts as a jump; the governor catches up
 /// with it.
