@@ -13,12 +13,10 @@ use crate::estimate::belt::BOUND_ERROR_M_S;
 use crate::estimate::model::Model;
 use crate::estimate::response::SETTLING_S;
 use crate::law::LawOutput;
-use crate::refer::governor::{Stretch, USABLE_REACH};
+use crate::refer::governor::{NEAR_M, Stretch, USABLE_REACH};
 
 /// Height above the belt at which the tip moves along it, m.
-const CLEARANCE_M: f32 = 1e-3;
-/// Distance from the landing point within which the tip is lowered, m.
-const OVER_LANDING_PLACE_M: f32 = 2.0 * CLEARANCE_M;
+const CLEARANCE_M: f32 = 0.5 * NEAR_M;
 /// Speed at which the tip is raised to its clearance, m/s.
 const RAISING_M_S: f32 = 0.1;
 /// Rate at which the height above the belt decays on the way down, as a part of the bandwidth of the motion.
@@ -116,8 +114,7 @@ impl RecoverySettings {
             flight.landing_m += (place_m - flight.landing_m).within(TRAVEL_M_S * tick_s);
             let tip_m = model.tip_m.x;
             away = place_m - tip_m;
-            away.abs() < OVER_LANDING_PLACE_M
-                || (flight.lands && tip_m > lower_m && tip_m < upper_m)
+            away.abs() < NEAR_M || (flight.lands && tip_m > lower_m && tip_m < upper_m)
         } else {
             false
         };
@@ -309,7 +306,7 @@ mod tests {
                 .is_some_and(|flight: Flight| flight.lands)
                 .then_some(known.tip_m.x)
         });
-        assert!(lands_at_m.is_some_and(|place_m| (place_m - tip_m.x).abs() < OVER_LANDING_PLACE_M));
+        assert!(lands_at_m.is_some_and(|place_m| (place_m - tip_m.x).abs() < NEAR_M));
     }
 
     proptest! {

@@ -24,9 +24,9 @@ use crate::refer::reference::TipReference;
 /// Fraction of the reach in use: beyond it the arm is almost straight.
 pub const USABLE_REACH: f32 = 1.0 - 0.5 * STRAIGHT_ARM_SINE * STRAIGHT_ARM_SINE;
 
-/// A reference farther than this from the last one, m, counts as a jump; the governor catches up
-/// with it.
-const JUMP_M: f32 = 2e-3;
+/// A place farther than this from another, m, is another place: a reference so far from the last one counts as a jump, which the
+/// governor catches up with, and a thrown tip is lowered this near its landing point.
+pub const NEAR_M: f32 = 2e-3;
 /// A reference nearer than this, m, has been caught up with.
 const CAUGHT_M: f32 = 2e-5;
 /// Lack of p at a place from which the kept distance is out of reach, 1/(kg·m), times 1 m and its distance from the middle: more
@@ -130,8 +130,8 @@ impl EdgeGovernor {
             {
                 // Farther from the tip nothing is known: a reference that went there might not stop at the edge.
                 self.stretch = Stretch {
-                    lower_m: tip_t_m - JUMP_M,
-                    upper_m: tip_t_m + JUMP_M,
+                    lower_m: tip_t_m - NEAR_M,
+                    upper_m: tip_t_m + NEAR_M,
                 };
             }
             self.searched_for = Some((posture, landing_p_ratio));
@@ -188,7 +188,7 @@ impl EdgeGovernor {
         // A reference that moves or is about to is on its way of one tick, or this far from it.
         let half_way_m = 0.5 * speed * tick_s;
         let away_m = (wanted.position_m - self.position_m - half_way_m).abs() - half_way_m.abs();
-        let near_m = if self.follows { JUMP_M } else { CAUGHT_M };
+        let near_m = if self.follows { NEAR_M } else { CAUGHT_M };
         self.follows = !self.at_edge && !outside(stop_m) && away_m < near_m;
         if self.follows {
             self.position_m = wanted.position_m;
