@@ -6,8 +6,6 @@
 
 use painleve_shared::{Arm, Real, settings};
 
-/// Fraction of a reading's error that averaging does not remove: successive roundings are not independent.
-const LASTING_ERROR: f32 = 0.1;
 /// Longest averaging time, s.
 const AVERAGING_S: f32 = 2.0;
 
@@ -56,7 +54,7 @@ impl LengthCalibrator {
     /// the error of the length, which is averaged from such readings.
     pub fn gap_error_m(&self, reading_error_m: f32) -> f32 {
         if self.readings > 0.0 {
-            reading_error_m * (1.0 + LASTING_ERROR + 1.0 / self.readings.square_root())
+            reading_error_m * (1.0 + 1.0 / self.readings.square_root())
         } else {
             reading_error_m
         }

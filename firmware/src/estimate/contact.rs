@@ -20,7 +20,7 @@ const DECISION: f32 = CERTAIN / 2.0;
 /// Largest contribution of a gap to contact.
 const GAP_FOR: f32 = CERTAIN / 3.0;
 /// Slope of the log-odds over the gap in units of its uncertainty.
-const GAP_SLOPE: f32 = 16.0;
+const GAP_SLOPE: f32 = 3.0 * CERTAIN;
 /// Variance of an innovation due to rounding, counts².
 const INNOVATION_VARIANCE: f32 = 1.0 / 12.0;
 

@@ -4,8 +4,9 @@ use super::Estimators;
 use super::contact::EncoderReading;
 use crate::last_command::LastCommand;
 
-/// Uncertainty of the gap beyond the encoders' resolution, m.
-const GAP_UNCERTAINTY_M: f32 = 15e-6;
+/// Uncertainty of the gap beyond the encoders' resolution, m; averaging does not remove all of it, because successive roundings
+/// are not independent.
+const GAP_UNCERTAINTY_M: f32 = 20e-6;
 
 impl Estimators {
     /// Returns the measured height of the tip above the belt, m.
