@@ -196,7 +196,7 @@ mod tests {
             calibration.update(0.0);
             calibration.calibrator.gap_error_m(50e-6)
         });
-        assert!((errors_m[0] - 105e-6).abs() < 1e-9 && (errors_m[99] - 60e-6).abs() < 1e-9);
+        assert!((errors_m[0] - 100e-6).abs() < 1e-9 && (errors_m[99] - 55e-6).abs() < 1e-9);
         assert!(errors_m.is_sorted_by(|before, after| before > after));
     }
 

@@ -266,13 +266,13 @@ fn without_noise(ticks: u32) -> Tested {
 #[test]
 fn a_rise_of_less_than_a_hundredth_is_not_sudden() {
     let mut tested = without_noise(3000);
-    tested.update(&Vector2::new(-6.08, 10.0));
+    tested.update(&Vector2::new(-6.07, 10.0));
     let learnt = tested.estimate.coefficient - 0.6;
-    assert!(learnt < 0.004, "{learnt}");
+    assert!(learnt < 0.0035, "{learnt}");
 }
 
 #[test]
-fn without_readings_the_deviation_grows_with_the_root_of_time() {
+fn what_is_known_is_forgotten_with_readings_only() {
     let Tested {
         mut estimator,
         mut estimate,
@@ -282,10 +282,5 @@ fn without_readings_the_deviation_grows_with_the_root_of_time() {
     for _ in 0..1000 {
         estimator.update(&mut estimate, &Vector2::new(-6.0, 10.0));
     }
-    let grown = estimate.variance - before;
-    let expected = DRIFT_PER_SQRT_S.powi(2);
-    assert!(
-        (grown - expected).abs() < 0.1 * expected,
-        "{grown} {expected}"
-    );
+    assert_eq!(estimate.variance, before);
 }

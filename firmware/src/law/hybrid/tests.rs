@@ -261,8 +261,7 @@ fn the_force_integral_removes_the_error_up_to_its_limit() {
         for _ in 0..100_000 {
             tip.with(HybridSettings::commanded_force_n);
         }
-        let limit = FORCE_INTEGRAL_PART * tip.law.normal_force_n;
-        assert_eq!(tip.state.force_integral_n, sign * limit);
+        assert_eq!(tip.state.force_integral_n, sign * tip.law.normal_force_n);
     }
 }
 
