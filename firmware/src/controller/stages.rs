@@ -33,7 +33,8 @@ impl<L: Law> Controller<L> {
         let landing = self.demand.flight.map(|flight| flight.posture);
         let target = self.references.tick(&self.estimates, &phase, landing);
         self.observed.elapsed_ticks = elapsed_ticks;
-        if phase.state.drives() {
+        let mut drives = phase.state.drives();
+        if drives {
             let output = self
                 .demand
                 .tick(&self.estimates, &phase, &target, self.command.saturated);
@@ -41,9 +42,10 @@ impl<L: Law> Controller<L> {
             self.command.reference_velocity_m_s = target.reference.velocity_m_s;
             if let Err(fault) = torques {
                 self.supervisor.latch(fault);
-                self.release();
+                drives = false;
             }
-        } else {
+        }
+        if !drives {
             self.release();
         }
         let (estimates, command) = (&self.estimates, &self.command);
@@ -52,14 +54,13 @@ impl<L: Law> Controller<L> {
         answer.reference_tip = Micrometres::from_metres(target.reference.position_m);
         answer.estimated_tip = Micrometres::from_metres(estimates.model.tip_m.x);
         let (touches, friction) = (estimates.contact.touches, &estimates.contact.friction);
-        let recovers = target.recovering && self.supervisor.drives();
         let slips = touches && friction.slip == Slip::Negative;
         let mut flags = StatusFlags::default();
         flags.set(StatusFlags::CONTACT, touches);
         flags.set(StatusFlags::SATURATED, command.saturated);
         flags.set(StatusFlags::REFERENCE_DONE, self.references.is_done());
         flags.set(StatusFlags::AT_EDGE, target.at_edge);
-        flags.set(StatusFlags::RECOVERING, recovers);
+        flags.set(StatusFlags::RECOVERING, target.recovering && drives);
         flags.set(StatusFlags::SLIP_NEGATIVE, slips);
         flags.set(StatusFlags::STICKS, touches && friction.sticks);
         answer.flags = flags;
