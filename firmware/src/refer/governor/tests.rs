@@ -118,8 +118,8 @@ fn what_moves_the_tip_adds_to_the_distance_in_squares() {
     configuration.arm.coulomb_friction_nm = [0.05, 0.02];
     configuration.settings.estimator.tip_deviation_m = 2e-3;
     let distance = distance_m(&configuration, 0.0);
-    // 0.5, 2.31, 3 and 4 mm.
-    assert!((distance - 5.55e-3).abs() < 3e-5, "{distance}");
+    // 0.5, 3.47, 3 and 4 mm.
+    assert!((distance - 6.11e-3).abs() < 3e-5, "{distance}");
     configuration.settings.governor = GovernorSettings::default();
     let more = distance_m(&configuration, 0.0);
     assert!(more > distance + 0.5e-3, "{more}");
