@@ -46,6 +46,24 @@ pub struct Drivers {
     ticks: u32,
 }
 
+/// Checks that a board's sensors resolve what the controller takes them to resolve.
+///
+/// # Errors
+/// [`BoardError::Parts`] if they are coarser.
+pub fn check_parts(configuration: &Configuration) -> Result<(), BoardError> {
+    let [encoder, _] = configuration.converters.encoders;
+    let force = configuration.converters.force;
+    for (key, wanted, has) in [
+        ("converters.encoder.bits", encoder.bits, encoders::BITS),
+        ("converters.force.bits", force.bits, force_cell::BITS),
+    ] {
+        if wanted > has {
+            return Err(BoardError::Parts { key, wanted, has });
+        }
+    }
+    Ok(())
+}
+
 impl Drivers {
     /// Creates the drivers and a configured controller, with probability `bit_errors` of a flipped
     /// bit on every sensor line.
@@ -54,16 +72,9 @@ impl Drivers {
     /// [`BoardError::Parts`] if the scenario's converters have a higher resolution than the parts,
     /// and [`BoardError::Refused`] if the configuration is out of range.
     pub fn new(configuration: &Configuration, bit_errors: f64) -> Result<Self, BoardError> {
+        check_parts(configuration)?;
         let [encoder, _] = configuration.converters.encoders;
         let force = configuration.converters.force;
-        for (key, wanted, has) in [
-            ("converters.encoder.bits", encoder.bits, encoders::BITS),
-            ("converters.force.bits", force.bits, force_cell::BITS),
-        ] {
-            if wanted > has {
-                return Err(BoardError::Parts { key, wanted, has });
-            }
-        }
         let mounting = configuration.converters.mounting;
         let clock = Clock::default();
         let mut encoder_bus = ModelledBus::new(&clock, ENCODER_BUS_HZ, true);

@@ -320,10 +320,14 @@ fn warn_of_rehearsal(scenario: &Scenario) {
     }
 }
 
-/// Returns the failure of a controller's process that is this command's as well: an output that it could not write, or a bug.
+/// Exit code of a process whose input cannot be used.
+const INVALID: u8 = 2;
+
+/// Returns the failure of a controller's process that is this command's as well: a setting that its host cannot use, an output
+/// that it could not write, or a bug.
 fn failure_of_its_own(status: ExitStatus, text: &str) -> Option<CommandError> {
     let code = u8::try_from(status.code()?).ok()?;
-    [UNWRITABLE, INTERNAL_ERROR]
+    [INVALID, UNWRITABLE, INTERNAL_ERROR]
         .contains(&code)
         .then(|| match cause(text) {
             Some(cause) => CommandError::Reported {
@@ -471,7 +475,7 @@ mod tests {
 
     #[test]
     fn a_run_ends_with_the_code_of_a_controller_that_has_a_bug_or_cannot_write() {
-        for code in [INTERNAL_ERROR, UNWRITABLE] {
+        for code in [INTERNAL_ERROR, UNWRITABLE, INVALID] {
             let status = ExitStatus::from_raw(i32::from(code) << 8);
             let failure = failure_of_its_own(status, "error: cause\n").unwrap();
             assert_eq!(

@@ -136,6 +136,38 @@ fn a_rehearsals_scenario_drives_no_real_arm() {
     }
 }
 
+#[test]
+fn a_resolution_that_a_boards_parts_do_not_have_is_refused() {
+    let bench = Bench::new("resolution");
+    for (part, has) in [("encoder", 14), ("force", 12)] {
+        let finer = format!("converters.{part}.bits=16");
+        let drive = &[
+            "drive",
+            "edge",
+            "--port",
+            "/dev/null",
+            "--dry-run",
+            "--no-record",
+        ][..];
+        let commission = &["commission", "edge", "--port", "/dev/null"][..];
+        let drivers = &[
+            "run",
+            "edge",
+            "--host",
+            "drivers",
+            "--no-record",
+            "--no-plot",
+        ][..];
+        for line in [drive, commission, drivers] {
+            let refused = bench.run(&[line, &["--set", &finer]].concat());
+            assert_eq!(code(refused.status), 2, "{line:?}: {}", errors(&refused));
+            let reason =
+                format!("converters.{part}.bits = 16: the board's part has only {has} bits");
+            assert!(errors(&refused).contains(&reason), "{}", errors(&refused));
+        }
+    }
+}
+
 /// Its parts may be mounted in the other direction; without a scenario, it would be the paper's arm.
 #[test]
 fn an_arm_that_was_not_commissioned_or_not_named_slides_nowhere() {

@@ -17,6 +17,7 @@ use painleve_shared::counts::TorqueCounts;
 use painleve_shared::frame::{ActuatorFrame, SensorFrame};
 use painleve_shared::message::{FrameSource, Health, Request, Response};
 
+use crate::drivers::check_parts;
 use crate::serial::PATIENCE;
 use crate::{BoardError, ConnectedBoard, LineHealth, Serial};
 
@@ -59,12 +60,13 @@ impl ConnectedArm {
     ///
     /// # Errors
     /// [`BoardError::Port`], [`BoardError::InUse`], [`BoardError::Silent`], [`BoardError::NoFrames`],
-    /// [`BoardError::OtherProtocol`], [`BoardError::OtherBuild`] or [`BoardError::Refused`].
+    /// [`BoardError::OtherProtocol`], [`BoardError::OtherBuild`], [`BoardError::Parts`] or [`BoardError::Refused`].
     pub fn open(
         path: &Path,
         configuration: &Configuration,
         source: FrameSource,
     ) -> Result<Self, BoardError> {
+        check_parts(configuration)?;
         let mut serial = Serial::connect(path)?;
         serial.identify()?;
         let black_box = serial.black_box()?;
