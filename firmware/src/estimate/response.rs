@@ -43,6 +43,8 @@ const RIGID: f32 = 0.5;
 const EACH_LOOP: f32 = 1.0 / 3.0;
 /// Number of delays between torque and force that are considered, in ticks. With two the torque was noisier (the same).
 const DELAYS: usize = 3;
+/// Turns before which the bounds are not evaluated: fewer readings may agree by chance.
+const LEAST_TURNS: f32 = 4.0;
 /// The law damps a contact if the upper bound of its response is below this part of [`RIGID`]. With more the torque was noisier (the same).
 const DAMPED: f32 = 0.4;
 /// Time in contact before the correlation starts: a contact that lasts longer is not a bounce, s.
@@ -166,7 +168,7 @@ impl ResponseEstimator {
         Self {
             settings: *settings,
             tick_s,
-            most_turns: (AVERAGING_S / (Turn::COUNT * tick_s)).at_least(1.0),
+            most_turns: (AVERAGING_S / (Turn::COUNT * tick_s)).at_least(LEAST_TURNS),
             least_share_kg: settings.least_damping_ns_m * tick_s,
             random: 1,
             spread: 1.0,
@@ -247,7 +249,7 @@ impl ResponseEstimator {
     /// Updates the bounds of ρ from the averages.
     #[inline(never)]
     pub fn bound(&mut self) {
-        if self.turns == 0.0 {
+        if self.turns < LEAST_TURNS {
             return;
         }
         let averages = self.averages.each_ref();
