@@ -43,7 +43,8 @@ const RIGID: f32 = 0.5;
 const EACH_LOOP: f32 = 1.0 / 3.0;
 /// Number of delays between torque and force that are considered, in ticks. With two the torque was noisier (the same).
 const DELAYS: usize = 3;
-/// Turns before which the bounds are not evaluated: fewer readings may agree by chance.
+/// Turns before which the bounds are not evaluated: fewer readings may agree by chance. From the first on, tips on standing belts
+/// lifted off (lab book, *Constants merged*).
 const LEAST_TURNS: f32 = 4.0;
 /// The law damps a contact if the upper bound of its response is below this part of [`RIGID`]. With more the torque was noisier (the same).
 const DAMPED: f32 = 0.4;
