@@ -8,7 +8,7 @@ use super::friction::FrictionEstimate;
 
 /// |sin(θ2 − θ1)| below which J⁻¹ is bounded: the arm is nearly straight, and no torque can move
 /// the tip along the belt.
-pub const STRAIGHT_ARM_SINE: f32 = 0.1;
+const STRAIGHT_ARM_SINE: f32 = 0.05;
 
 /// Terms of the equations of motion at one state; all zero before the first evaluation.
 #[derive(Clone, Copy, Debug, Default)]
@@ -244,10 +244,10 @@ mod tests {
         let arm = Arm::new(ArmParameters::default()).unwrap();
         for (sine, share) in [
             (0.2, 1.0),
-            (0.1, 1.0),
-            (0.08, 0.8),
-            (0.02, 0.2),
-            (-0.02, 0.2),
+            (0.05, 1.0),
+            (0.04, 0.8),
+            (0.01, 0.2),
+            (-0.01, 0.2),
         ] {
             let elbow_rad = libm::asinf(sine);
             let theta = LinkMotion::new(0.3, 0.3 + elbow_rad);

@@ -18,11 +18,10 @@ use painleve_shared::{Arm, Posture, Real};
 use self::search::Search;
 pub use self::settings::GovernorSettings;
 use crate::estimate::friction::FrictionEstimate;
-use crate::estimate::model::STRAIGHT_ARM_SINE;
 use crate::refer::reference::TipReference;
 
 /// Fraction of the reach in use: beyond it the arm is almost straight.
-pub const USABLE_REACH: f32 = 1.0 - 0.5 * STRAIGHT_ARM_SINE * STRAIGHT_ARM_SINE;
+pub const USABLE_REACH: f32 = 0.995;
 
 /// A place farther than this from another, m, is another place: a reference so far from the last one counts as a jump, which the
 /// governor catches up with, and a thrown tip is lowered this near its landing point.
