@@ -82,6 +82,8 @@ pub struct FrontEnd {
     /// Ticks for which RESET has been pressed, with ENABLE open.
     pressed_ticks: u32,
     is_active: bool,
+    /// Whether the last frame had ENABLE.
+    is_enabled: bool,
     /// Torques put out since the last frame.
     torques: [TorqueCounts; 2],
     is_fit: bool,
@@ -120,6 +122,7 @@ impl FrontEnd {
             may_arm: false,
             pressed_ticks: 0,
             is_active: false,
+            is_enabled: false,
             torques: [TorqueCounts(0); 2],
             is_fit: false,
         }
@@ -149,9 +152,13 @@ impl FrontEnd {
     }
 
     /// Records whether the controller's last answer is in a state in which torque may be applied, and the
-    /// torques that are put out, zero with the stages off. A drive that has stopped needs a new permission.
+    /// torques that are put out, zero with the stages off. A drive that has stopped needs a new permission. A switch that was
+    /// closed without effect, as in a fault, must be opened first: ENABLE that comes again with a reading would arm the drive.
     pub fn note_output(&mut self, is_active: bool, torques: [TorqueCounts; 2]) {
         self.may_arm &= is_active || !self.is_active;
+        if self.is_enabled && !is_active {
+            self.switches.must_open();
+        }
         self.is_active = is_active;
         self.torques = torques;
     }
@@ -290,6 +297,7 @@ impl FrontEnd {
         if !self.may_arm {
             inputs.remove(DigitalInputs::ENABLE);
         }
+        self.is_enabled = inputs.contains(DigitalInputs::ENABLE);
         self.sequence = self.sequence.wrapping_add(1);
         SensorFrame {
             tick: self.sequence,

@@ -2,9 +2,9 @@
 
 use std::collections::BTreeSet;
 
-use painleve_chips::{MICROSECOND, MILLISECOND};
+use painleve_chips::{BitErrors, MICROSECOND, MILLISECOND};
 use painleve_flash_image::bench::{Bench, encoded, scenario};
-use painleve_flash_image::board::{BoardChip, EmulatedBoard, F405, G474};
+use painleve_flash_image::board::{BoardChip, EmulatedBoard, F405, G474, RESET, STAGES_READY};
 use painleve_plant::law_choice::build;
 use painleve_plant::statistics::Statistics;
 use painleve_shared::message::{FrameSource, PROTOCOL, Request, Response};
@@ -24,6 +24,7 @@ crate::on_each_board! {
     nothing_arms_without_the_hosts_permission,
     a_drive_that_was_switched_off_needs_a_new_permission,
     a_permission_does_not_arm_while_the_switch_is_closed,
+    a_switch_closed_in_a_fault_does_not_arm_after_the_reset,
     a_dry_run_controls_with_the_stages_off,
     a_configuration_of_another_build_is_refused,
     a_configuration_is_accepted_while_the_arm_is_driven,
@@ -220,6 +221,33 @@ fn a_permission_does_not_arm_while_the_switch_is_closed<C: BoardChip>() {
     bench.assert_stays_off(20);
     assert!(bench.board.permit_arming());
     bench.assert_stays_off(100);
+    bench.board.enable(false);
+    bench.assert_stays_off(20);
+    bench.board.enable(true);
+    assert!(!bench.stays_off(100));
+}
+
+/// Nor does it if a reading is lost then, after which ENABLE comes again.
+fn a_switch_closed_in_a_fault_does_not_arm_after_the_reset<C: BoardChip>() {
+    let mut bench = driven::<C>();
+    bench.drive_pin(STAGES_READY, Some(false));
+    assert!(bench.time_until_off().is_some());
+    bench.assert_stays_off(5);
+    bench.drive_pin(STAGES_READY, Some(true));
+    bench.board.enable(false);
+    bench.assert_stays_off(100);
+    assert!(bench.board.permit_arming());
+    bench.assert_stays_off(20);
+    bench.board.enable(true);
+    bench.assert_stays_off(20);
+    bench.drive_pin(RESET, Some(true));
+    bench.assert_stays_off(20);
+    bench.drive_pin(RESET, Some(false));
+    bench.assert_stays_off(100);
+    bench.board.wiring().encoders[0].bit_errors = BitErrors::new(0.5, 1);
+    bench.assert_stays_off(1);
+    bench.board.wiring().encoders[0].bit_errors = BitErrors::new(0.0, 1);
+    bench.assert_stays_off(200);
     bench.board.enable(false);
     bench.assert_stays_off(20);
     bench.board.enable(true);
