@@ -305,7 +305,8 @@ impl PySimulation {
         Ok((sensor, self.simulation.sensor_frame_is_lost()))
     }
 
-    /// Passes the controller's answer, or `None`, to the torque stages and advances to the next tick.
+    /// Passes the controller's answer, or `None`, to the torque stages and advances to the next tick. An answer to another tick,
+    /// or with an unknown state or fault, raises `ValueError`.
     #[pyo3(signature = (answer))]
     fn advance(&mut self, py: Python<'_>, answer: Option<Actuator>) -> PyResult<()> {
         let frame = answer.map(

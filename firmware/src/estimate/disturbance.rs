@@ -22,7 +22,7 @@ settings! {
     /// Settings of the disturbance observer.
     #[derive(Copy)]
     pub struct DisturbanceSettings {
-        /// Bandwidth far from the edge; 0 for no estimate.
+        /// Bandwidth in the air. On the belt it falls with p/Q22; 0 for no estimate.
         bandwidth_rad_s: f32 = 20.0, 0.0..=1e3, "rad/s";
     }
 }
@@ -30,7 +30,7 @@ settings! {
 /// The low-pass of the residual.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct DisturbanceEstimator {
-    /// Fraction of the residual adopted at once far from the edge.
+    /// Fraction of the residual adopted at once in the air.
     weight: f32,
     limit_nm: f32,
     tick_s: f32,
@@ -88,9 +88,10 @@ impl DisturbanceEstimator {
         if residual_nm.amax() > 2.0 * limit_nm {
             return;
         }
-        // By the contact's response alone, fewer runs were kept (lab book, *Parts of the friction estimate left out*).
+        // Limited by the contact's response alone, without p/Q22, fewer runs were kept (lab book, *Parts of the friction
+        // estimate left out*).
         let weight = p_ratio.map_or(self.weight.at_most(1.0), |p_ratio| {
-            (self.weight * p_ratio).limited(0.0, loop_share)
+            (self.weight * p_ratio.at_most(1.0)).limited(0.0, loop_share)
         });
         self.torque_nm =
             (self.torque_nm + residual_nm * weight).map(|torque| torque.within(limit_nm));

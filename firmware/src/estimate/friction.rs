@@ -22,7 +22,7 @@ use super::response::AVERAGING_S;
 
 /// Square of the number of standard deviations, four, beyond which something is not noise: the sign of a friction force, an
 /// average of innovations, a change of the innovation. A sudden change of μ is not noise: counted as such, it would hide the next
-/// one. No campaign shows it, a test does.
+/// one. No campaign shows the need for the last one; a test does.
 const NO_NOISE_SQUARE: f32 = 16.0;
 /// The same, eight, of a single reading: of another μ or, below the estimate, of a tip that may stick. This one threshold did as
 /// well as the rules it replaced (lab book, *Parts of the friction estimate left out*).
@@ -206,7 +206,9 @@ impl FrictionEstimator {
     fn adapt(&mut self, estimate: &mut FrictionEstimate, correction: Correction, normal_n: f32) {
         let innovation = correction.innovation;
         let ratio_variance = self.reading_variance_n2 / (normal_n * normal_n);
-        estimate.variance *= (1.0 - correction.gain) * self.forgetting;
+        // A variance of zero would never grow again.
+        let kept = (1.0 - correction.gain).at_least(f32::EPSILON);
+        estimate.variance *= kept * self.forgetting;
         // Innovations that keep their sign are not noise: μ has changed.
         let weight = self.mean_weight;
         let change = innovation - self.innovation;

@@ -138,7 +138,7 @@ pub enum BoardError {
     Deaf(Duration),
     /// The emulator has ended on its own.
     #[error(
-        "the emulated STM32F405 has stopped ({0}): give an image for this chip; with --log, run shows its log"
+        "the emulated STM32F405 has stopped ({0}): is the image built for this chip? run --log shows its log"
     )]
     Ended(ExitStatus),
     /// The board has been silent for too long.

@@ -102,7 +102,8 @@ extern "C" {
 #endif // __cplusplus
 
 // Returns the message of this thread's last failed call, in one sentence; empty if no call has
-// failed. It is valid until this thread's next failed call: call it after that one, not among the arguments of one call with it.
+// failed. It is valid until this thread's next failed call: call this function in a statement of its
+// own, because C evaluates the arguments of a call in any order.
 const char *painleve_last_error(void);
 
 // Creates the controller of a scenario.

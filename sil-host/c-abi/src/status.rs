@@ -66,7 +66,8 @@ thread_local! {
 }
 
 /// Returns the message of this thread's last failed call, in one sentence; empty if no call has
-/// failed. It is valid until this thread's next failed call: call it after that one, not among the arguments of one call with it.
+/// failed. It is valid until this thread's next failed call: call this function in a statement of its
+/// own, because C evaluates the arguments of a call in any order.
 #[unsafe(no_mangle)]
 pub extern "C" fn painleve_last_error() -> *const c_char {
     LAST_ERROR.with_borrow(|message| message.as_ptr())

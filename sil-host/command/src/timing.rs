@@ -105,7 +105,7 @@ pub fn run(arguments: &TimingArguments) -> Result<(), CommandError> {
         let report = measure(arguments, scenario, &interrupt)?;
         if let Some(fault) = report.fault {
             warn(format_args!(
-                "{}: the controller has latched fault {fault}; its ticks from then on do less than those that control",
+                "{}: the controller has latched fault {fault}; later ticks do less work than those of a driven arm",
                 scenario.name
             ));
         }

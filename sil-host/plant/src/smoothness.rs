@@ -26,8 +26,8 @@ pub struct Smoothness {
     tick_hz: f64,
     /// Whether the reference moves.
     moves: bool,
-    /// Where it was when its velocity was last taken, and the ticks since.
-    way: (Micrometres, u32),
+    /// Where it was when its velocity was last taken, and the ticks since; absent unless the controller tracks.
+    way: Option<(Micrometres, u32)>,
     /// Ticks since the reference moved, or since tracking began.
     rest_ticks: u64,
     /// The answer before, if the controller tracked, and the changes of torque that it brought, counts.
@@ -91,7 +91,7 @@ impl Smoothness {
             holding: Roughness::default(),
             tick_hz,
             moves: false,
-            way: (Micrometres(0), 0),
+            way: None,
             rest_ticks: 0,
             last: None,
         }
@@ -103,25 +103,32 @@ impl Smoothness {
         let Some(answer) = answer else {
             // A reference that stands does not move because a frame is lost.
             self.last = None;
+            if let Some((_, ticks)) = &mut self.way {
+                *ticks += 1;
+            }
             return;
         };
         if answer.supervisor_state() != Some(SupervisorState::Tracking) {
             self.last = None;
             self.rest_ticks = 0;
+            self.moves = false;
+            self.way = None;
             return;
         }
         let here = answer.reference_tip;
+        let (from, ticks) = self
+            .way
+            .map_or((here, 0), |(from, ticks)| (from, ticks + 1));
+        let time_s = f64::from(ticks) / self.tick_hz;
+        self.way = Some((from, ticks));
+        if time_s >= VELOCITY_S {
+            self.moves = (here.to_metres() - from.to_metres()).abs() > MOVING_M_S * time_s;
+            self.way = Some((here, 0));
+        }
         let mut changes = [0; 2];
         if let Some((last, before)) = &self.last {
             for (joint, change) in changes.iter_mut().enumerate() {
                 *change = i64::from(answer.torques[joint].0) - i64::from(last.torques[joint].0);
-            }
-            let (from, ticks) = (self.way.0, self.way.1 + 1);
-            let time_s = f64::from(ticks) / self.tick_hz;
-            self.way = (from, ticks);
-            if time_s >= VELOCITY_S {
-                self.moves = (here.to_metres() - from.to_metres()).abs() > MOVING_M_S * time_s;
-                self.way = (here, 0);
             }
             if self.moves {
                 self.rest_ticks = 0;
@@ -132,8 +139,6 @@ impl Smoothness {
                     self.holding.add(changes, *before, normal_force_n);
                 }
             }
-        } else {
-            self.way = (here, 0);
         }
         self.last = Some((*answer, changes));
     }

@@ -90,3 +90,51 @@ impl Telemetry {
         };
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Configuration;
+    use painleve_shared::counts::{EncoderCounts, ForceCounts};
+    use painleve_shared::frame::DigitalInputs;
+    use painleve_shared::status::SupervisorState;
+
+    /// The tip rests on the belt, pressed by 10 N; more torque than is left would hold it.
+    #[test]
+    fn limited_torques_are_counted_and_a_tick_without_readings_may_take_them_off() {
+        let mut configuration = Configuration::default();
+        configuration.settings.torque_limit_nm = 0.05;
+        let mut controller = Controller::new(&configuration).unwrap();
+        let converters = configuration.converters;
+        let [theta_1, theta_2] = [-11.4_f64, -35.1].map(f64::to_radians);
+        let [encoder, _] = converters.encoders;
+        let pressed = |tick| SensorFrame {
+            tick,
+            sequence: tick,
+            joints: [theta_1, theta_2 - theta_1].map(|angle| encoder.reading(angle)),
+            normal_force: ForceCounts(converters.force.counts(10.0).0),
+            tangential_force: ForceCounts(converters.force.counts(-6.0).0),
+            inputs: DigitalInputs::ENABLE,
+        };
+        let mut telemetry = Telemetry::default();
+        for tick in 0..30 {
+            telemetry.tick(&mut controller, &pressed(tick));
+        }
+        assert!(
+            telemetry.saturated && telemetry.saturated_ticks > 10,
+            "{telemetry:?}"
+        );
+        assert!(telemetry.torque_nm.amax() > 0.0);
+        let missing = |tick| SensorFrame {
+            joints: [EncoderCounts::MISSING; 2],
+            ..pressed(tick)
+        };
+        let mut answer = ActuatorFrame::default();
+        for tick in 30..100 {
+            answer = telemetry.tick(&mut controller, &missing(tick));
+        }
+        assert_eq!(answer.supervisor_state(), Some(SupervisorState::Fault));
+        assert_eq!(telemetry.torque_nm, JointTorque::zeros());
+        assert!(!telemetry.saturated && !telemetry.at_edge && !telemetry.recovering);
+    }
+}

@@ -266,9 +266,30 @@ fn without_noise(ticks: u32) -> Tested {
 #[test]
 fn a_rise_of_less_than_a_hundredth_is_not_sudden() {
     let mut tested = without_noise(3000);
+    // Eight deviations of a reading and of what is known are 0.0077.
     tested.update(&Vector2::new(-6.07, 10.0));
     let learnt = tested.estimate.coefficient - 0.6;
     assert!(learnt < 0.0035, "{learnt}");
+}
+
+/// The variance settles at R T/τ, whatever it was: with the least noise, and with none that a gain near one resolves.
+#[test]
+fn what_is_known_is_forgotten_in_the_averaging_time() {
+    let noise_n = cell().force_noise_n;
+    let least = LEAST_NOISE * noise_n * noise_n * (1.0 + 0.6 * 0.6) / (10.0 * 10.0);
+    let settled = without_noise(5000).estimate.variance;
+    let expected = least * 1e-3 / AVERAGING_S;
+    assert!(
+        (settled / expected - 1.0).abs() < 0.1,
+        "{settled} {expected}"
+    );
+    let mut surest = without_noise(0);
+    surest.estimator.force_variance_n2 *= 1e-8;
+    surest.estimator.reading_variance_n2 *= 1e-8;
+    for _ in 0..3000 {
+        surest.update(&Vector2::new(-6.0, 10.0));
+        assert!(surest.estimate.variance > 0.0);
+    }
 }
 
 #[test]

@@ -23,8 +23,8 @@ use crate::refer::reference::TipReference;
 /// Fraction of the reach in use: beyond it the arm is almost straight.
 pub const USABLE_REACH: f32 = 0.995;
 
-/// A place farther than this from another, m, is another place: a reference so far from the last one counts as a jump, which the
-/// governor catches up with, and a thrown tip is lowered this near its landing point.
+/// Distance within which two places count as the same, m. A reference that moves farther in a tick is a jump, with which the
+/// governor catches up; a thrown tip is lowered within it of its landing point.
 pub const NEAR_M: f32 = 2e-3;
 /// A reference nearer than this, m, has been caught up with.
 const CAUGHT_M: f32 = 2e-5;

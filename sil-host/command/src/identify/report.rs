@@ -131,7 +131,7 @@ fn sentences(found: &Found) -> Vec<String> {
         ),
         format!(
             "Its position is known to {:.2} mm plus {:.2} % for the length of link 1; its distance from the edges to {:.2} mm \
-             (of a drawn arm: {:.1} mm).",
+             (of an arm known from its drawing only: {:.1} mm).",
             1e3 * identified.place_deviation_m,
             100.0 * length_deviation,
             1e3 * identified.tip_deviation_m,

@@ -158,6 +158,7 @@ fn value(given: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scenario::Scenario;
 
     #[test]
     fn messages_of_parsers_are_told_in_our_words() {
@@ -197,5 +198,21 @@ mod tests {
         ] {
             assert_eq!(in_words(theirs, None), ours);
         }
+    }
+
+    /// The prefix is that of the library's message.
+    #[test]
+    fn several_kinds_at_once_are_told_which_there_are() {
+        let both = "contact.normal={ kind = 'hunt-crossley', dissipation_s_m = 2 }";
+        let refused = Scenario::default().with_overrides("test", &[both.into()]);
+        let message = refused.unwrap_err().to_string();
+        assert!(
+            message.contains("give one kind, a table as in { kelvin-voigt = { … } }"),
+            "{message}"
+        );
+        assert!(
+            message.contains("known: kelvin-voigt, restitution, hunt-crossley"),
+            "{message}"
+        );
     }
 }

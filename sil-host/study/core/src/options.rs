@@ -191,6 +191,7 @@ impl FrictionGrid {
         for controller in controllers {
             mu.push(controller.load_unplaced()?.belt.friction);
         }
+        mu.sort_by(f64::total_cmp);
         mu.dedup();
         match mu[..] {
             [_] => Ok(mu),
