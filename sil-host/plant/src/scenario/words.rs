@@ -69,10 +69,9 @@ pub(super) fn in_words(message: &str, setting: Option<&Field>) -> String {
     if message == "duplicate key" {
         return "this key is there already: give it once, or merge the two tables".into();
     }
-    if let (true, Some(Shape::Choice { variants, .. })) = (
-        message.starts_with("wanted exactly 1 element"),
-        setting.map(|setting| setting.shape),
-    ) {
+    if let Some(Shape::Choice { variants, .. }) = setting.map(|setting| setting.shape)
+        && message.starts_with("wanted exactly 1 element")
+    {
         let kinds: Vec<&str> = variants.iter().map(|variant| variant.key).collect();
         let example = variants.iter().find(|variant| variant.content.is_some());
         let example = example.map_or("", |variant| variant.key);

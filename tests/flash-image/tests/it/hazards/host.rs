@@ -211,6 +211,14 @@ fn a_drive_that_was_switched_off_needs_a_new_permission<C: BoardChip>() {
     bench.assert_stays_off(100);
 }
 
+/// Opens the switch and closes it again, and checks that the arm is driven then.
+fn assert_drives_after_opening_and_closing<C: BoardChip>(bench: &mut Bench<C>) {
+    bench.board.enable(false);
+    bench.assert_stays_off(20);
+    bench.board.enable(true);
+    assert!(!bench.stays_off(100));
+}
+
 /// The arm moves when the operator closes the switch, never when the host permits it.
 fn a_permission_does_not_arm_while_the_switch_is_closed<C: BoardChip>() {
     let mut bench = driven::<C>();
@@ -221,10 +229,7 @@ fn a_permission_does_not_arm_while_the_switch_is_closed<C: BoardChip>() {
     bench.assert_stays_off(20);
     assert!(bench.board.permit_arming());
     bench.assert_stays_off(100);
-    bench.board.enable(false);
-    bench.assert_stays_off(20);
-    bench.board.enable(true);
-    assert!(!bench.stays_off(100));
+    assert_drives_after_opening_and_closing(&mut bench);
 }
 
 /// Nor does it if a reading is lost then, after which ENABLE comes again.
@@ -248,10 +253,7 @@ fn a_switch_closed_in_a_fault_does_not_arm_after_the_reset<C: BoardChip>() {
     bench.assert_stays_off(1);
     bench.board.wiring().encoders[0].bit_errors = BitErrors::new(0.0, 1);
     bench.assert_stays_off(200);
-    bench.board.enable(false);
-    bench.assert_stays_off(20);
-    bench.board.enable(true);
-    assert!(!bench.stays_off(100));
+    assert_drives_after_opening_and_closing(&mut bench);
 }
 
 fn a_dry_run_controls_with_the_stages_off<C: BoardChip>() {
