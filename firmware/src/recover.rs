@@ -1,8 +1,8 @@
 //! Returns a tip that has left the belt to it, softly and within the admissible stretch.
 //!
-//! In the air the joints are double integrators (computed torque) that follow a tip path: above the
+//! In the air the links are double integrators (computed torque) that follow a tip path: above the
 //! belt to the admissible stretch, then down, slower at lower heights, until the tip touches and the
-//! law resumes. The path is followed in joint angles, because a thrown arm may swing through the
+//! law resumes. The path is followed in link angles, because a thrown arm may swing through the
 //! straight posture, where some tip accelerations are impossible. A tip at rest lands with the belt's
 //! full slip, in the direction for which the stretch is admissible.
 
@@ -41,7 +41,7 @@ settings! {
     pub struct RecoverySettings {
         /// Bandwidth of the motion in the air.
         bandwidth_rad_s: f32 = 60.0, 1.0..=1e3, "rad/s";
-        /// Largest acceleration of the joints in the air.
+        /// Largest acceleration in the air: the norm of both links'.
         acceleration_rad_s2: f32 = 500.0, 1.0..=1e5, "rad/s²";
         /// Speed at which the tip is lowered onto the belt.
         landing_speed_m_s: f32 = 0.02, 1e-3..=1.0, "m/s";

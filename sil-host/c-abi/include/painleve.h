@@ -14,7 +14,7 @@
 typedef enum {
   // Success.
   PAINLEVE_STATUS_OK = 0,
-  // A pointer is null or not aligned, or a text is not UTF-8.
+  // A pointer is null or not aligned, a text is not UTF-8, or an answer is to another tick or unknown.
   PAINLEVE_STATUS_INVALID_ARGUMENT = 1,
   // The scenario is invalid.
   PAINLEVE_STATUS_INVALID_SCENARIO = 2,

@@ -15,7 +15,7 @@ use painleve_shared::range::OutOfRange;
 pub enum PainleveStatus {
     /// Success.
     Ok = 0,
-    /// A pointer is null or not aligned, or a text is not UTF-8.
+    /// A pointer is null or not aligned, a text is not UTF-8, or an answer is to another tick or unknown.
     InvalidArgument = 1,
     /// The scenario is invalid.
     InvalidScenario = 2,

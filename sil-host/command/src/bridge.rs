@@ -73,7 +73,7 @@ pub struct BusArguments {
 /// Disturbances of the sensor lines.
 #[derive(Clone, Debug, Default, Args, Serialize, Deserialize)]
 pub struct SensorLineArguments {
-    /// With --host drivers: probability that a bit on a sensor line is flipped.
+    /// Probability that a bit on a sensor line of the drivers is flipped.
     #[arg(long, value_name = "PROBABILITY", default_value_t = 0.0, value_parser = probability)]
     pub bit_errors: f64,
 }

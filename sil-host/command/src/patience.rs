@@ -15,8 +15,8 @@ pub const WAIT_S: f64 = 1.7;
 /// The option `--silence-limit-s`.
 #[derive(Clone, Debug, Args, Serialize, Deserialize)]
 pub struct PatienceArguments {
-    /// Longest silence of the other process, s; the run then ends with code 3. For a board the limit
-    /// is two thirds of it. Increase it on a busy machine, or to stop at breakpoints.
+    /// Longest silence of the other process, s; the run then ends with code 3. A board's limit
+    /// is two thirds of this. Increase it on a busy machine, or to stop at breakpoints.
     #[arg(
         long,
         value_name = "SECONDS",

@@ -100,7 +100,7 @@ pub enum Mistake {
     },
     /// The encoders are exchanged.
     #[error(
-        "encoders: exchanged with each other; swap their select lines (PB6 and PB7, or PB10 and PB11 of second encoders)"
+        "encoders: exchanged; swap their select lines (PB6 and PB7, or PB10 and PB11 of second encoders)"
     )]
     EncodersSwapped,
     /// An encoder turns by another angle than its joint.
@@ -125,7 +125,7 @@ pub enum Mistake {
     },
     /// The torque limit is too low for the force cell.
     #[error(
-        "torque stage of {}: within the torque limit, the force changes by {change_n:.3} N only, too little for the force cell; raise --torque-limit-nm",
+        "torque stage of {}: within the torque limit, the force changes by only {change_n:.3} N, too little for the force cell; raise --torque-limit-nm",
         JOINT_NAMES[*.joint]
     )]
     TorqueTooSmall {
@@ -181,7 +181,7 @@ pub enum Mistake {
     },
     /// The model cannot press on the belt.
     #[error(
-        "arm: by the scenario its weight presses on the belt below joint 1 with {expected_n:.2} N only, too little to measure; check link_mass_kg, the springs, belt_tilt_rad and converters.force.range_n"
+        "arm: according to the scenario, its weight presses on the belt below joint 1 with only {expected_n:.2} N, too little to measure; check link_mass_kg, the springs, belt_tilt_rad and converters.force.range_n"
     )]
     TooLight {
         /// Force expected from the weight, N.
@@ -189,7 +189,7 @@ pub enum Mistake {
     },
     /// The model presses harder than the force cell measures.
     #[error(
-        "arm: by the scenario its weight presses on the belt below joint 1 with {expected_n:.1} N, more than the force cell measures (converters.force.range_n = {range_n}, of which the codes in converters.mounting leave {most_n:.1} N); check link_mass_kg and the springs, or take another cell"
+        "arm: according to the scenario, its weight presses on the belt below joint 1 with {expected_n:.1} N, more than the force cell measures (converters.force.range_n = {range_n}, of which the codes in converters.mounting leave {most_n:.1} N); check link_mass_kg and the springs, or take another cell"
     )]
     TooHeavy {
         /// Force expected from the weight, N.
@@ -235,7 +235,7 @@ pub enum Mistake {
         range_n: f64,
     },
     /// The torque stages are exchanged.
-    #[error("torque stages: exchanged with each other; swap their inputs (PA4, PA5)")]
+    #[error("torque stages: exchanged; swap their inputs (PA4, PA5)")]
     StagesSwapped,
     /// A torque stage has another scale.
     #[error(

@@ -112,7 +112,7 @@ pub fn advice(scenario: &Scenario) -> Result<String, OutOfRange> {
         });
     }
     Ok(format!(
-        "Set the tip down here, seen from the point below joint 1 (friction coefficient {:.2}): {}. Farther out, a start can throw it.",
+        "Set the tip down here, seen from the point below joint 1 (friction coefficient {:.2}): {}. Farther out, the tip may be thrown off at the start.",
         scenario.belt.friction,
         places.join("; ")
     )

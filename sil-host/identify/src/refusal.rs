@@ -61,9 +61,9 @@ fn name(posture: Posture) -> &'static str {
 /// cannot be told from its frame.
 fn surface(percent: f64) -> &'static str {
     if percent < ALWAYS_AGAINST {
-        "as if the belt ran in the other direction: let it run as told, and check the sign of f_t (converters.mounting.force_reversed)"
+        "as if the belt ran in the other direction: let it run as instructed, and check the sign of f_t (converters.mounting.force_reversed)"
     } else {
-        "as on a surface that stands still or is slower than the tip: set the tip down on the belt, not beside it, and let the belt run as told"
+        "as on a surface that stands still or is slower than the tip: set the tip down on the belt, not beside it, and let the belt run as instructed"
     }
 }
 
@@ -80,7 +80,7 @@ pub enum Refusal {
     },
     /// There is no tick.
     #[error(
-        "slide {}: the drive has tracked in no tick; give the record of a slide, or see what kept the drive from it, such as a tip that does not touch the belt",
+        "slide {}: the drive was never tracking; give the record of a slide, or see what prevented it, such as a tip that does not touch the belt",
         .slide + 1
     )]
     NeverTracked {
@@ -89,7 +89,7 @@ pub enum Refusal {
     },
     /// The tip pressed too hard, and the slide was ended.
     #[error(
-        "slide {}: the tip pressed on the belt with {most_n:.0} N or more, and the torque was taken off; see what it catches on, and check the masses and springs that the scenario tells of the arm",
+        "slide {}: the tip pressed on the belt with {most_n:.0} N or more, and the torque was taken off; see what it catches on, and check the masses and springs that the scenario gives for the arm",
         .slide + 1
     )]
     PressedTooHard {
@@ -100,7 +100,7 @@ pub enum Refusal {
     },
     /// The tip moved too fast, and the slide was ended.
     #[error(
-        "slide {}: the tip moved faster than {most_m_s} m/s, and the torque was taken off; see whether the tip is on the belt and what throws it, and check controller.torque_limit_nm and the masses and springs that the scenario tells of the arm",
+        "slide {}: the tip moved faster than {most_m_s} m/s, and the torque was taken off; see whether the tip is on the belt and what throws it, and check controller.torque_limit_nm and the masses and springs that the scenario gives for the arm",
         .slide + 1
     )]
     MovedTooFast {
@@ -111,7 +111,7 @@ pub enum Refusal {
     },
     /// Too many ticks have no reading of some sensor, or none that the scenario's sensors give.
     #[error(
-        "slide {}: {percent:.0} % of the ticks lack a reading or torque that the scenario's converters can give; check the sensors' lines, and bits in converters.encoder, converters.force and converters.torque",
+        "slide {}: {percent:.0} % of the ticks lack a valid reading or torque; check the sensors' lines, and bits in converters.encoder, converters.force and converters.torque",
         .slide + 1
     )]
     MissingReadings {
@@ -135,7 +135,7 @@ pub enum Refusal {
     },
     /// The tip was in the air.
     #[error(
-        "slide {}: the tip was on the belt in {percent:.0} % of the readings only (f_n of {contact_n} N or more); press it down, and check the force cell and controller.torque_limit_nm",
+        "slide {}: the tip was on the belt in only {percent:.0} % of the readings (f_n of {contact_n} N or more); press it down, and check the force cell and controller.torque_limit_nm",
         .slide + 1
     )]
     NotOnBelt {
@@ -148,7 +148,7 @@ pub enum Refusal {
     },
     /// Friction does not push the tip in the direction in which the belt was to run.
     #[error(
-        "slide {}: friction pushes the tip in the belt's direction in {percent:.0} % of the readings only, {}",
+        "slide {}: friction pushes the tip in the belt's direction in only {percent:.0} % of the readings, {}",
         .slide + 1,
         surface(*.percent)
     )]
@@ -160,7 +160,7 @@ pub enum Refusal {
     },
     /// Too little motion.
     #[error(
-        "the tip slid by {slid_mm:.0} mm only, less than {least_mm:.0} mm: see what holds it, and check the masses and belt.friction, by which the governor may stop it"
+        "the tip slid only {slid_mm:.0} mm, less than {least_mm:.0} mm: see what holds it, and check the masses and belt.friction, because of which the governor may stop it"
     )]
     TooShort {
         /// Distance, mm.
@@ -170,7 +170,7 @@ pub enum Refusal {
     },
     /// The arm was in the other posture.
     #[error(
-        "slide {}: the arm was in the posture {}, not as told; tell its posture, or turn the elbow",
+        "slide {}: the arm was in the posture {}, not as told; give the right posture, or turn the elbow",
         .slide + 1,
         name(*.found)
     )]
@@ -181,7 +181,7 @@ pub enum Refusal {
         found: Posture,
     },
     /// The encoders are exchanged.
-    #[error("encoders: exchanged with each other; swap their select lines")]
+    #[error("encoders: exchanged; swap their select lines")]
     EncodersSwapped,
     /// An encoder counts backwards.
     #[error(
@@ -218,7 +218,7 @@ pub enum Refusal {
     },
     /// The model does not explain the torques.
     #[error(
-        "the arm's model leaves {left_mnm:.0} of {torque_mnm:.0} mN·m of torque unexplained (root mean square): check the lines of the force cell and of the torque stages, and the masses, centres of mass and springs that the scenario tells of the arm"
+        "the arm's model leaves {left_mnm:.0} of {torque_mnm:.0} mN·m of torque unexplained (root mean square): check the lines of the force cell and of the torque stages, and the masses, centres of mass and springs that the scenario gives for the arm"
     )]
     OtherTorques {
         /// Torque that is left over, mN·m.
@@ -243,7 +243,7 @@ pub enum Refusal {
     },
     /// The slides do not determine the tip's position.
     #[error(
-        "the slides determine the tip's position to {deviation_mm:.2} mm only, where {limit_mm:.2} mm are needed: {}",
+        "the slides determine the tip's position only to {deviation_mm:.2} mm, but {limit_mm:.2} mm are needed: {}",
         advice(.missing.as_ref(), *.off_mm)
     )]
     NotObserved {

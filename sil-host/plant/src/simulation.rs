@@ -61,7 +61,7 @@ impl Simulation {
 #[derive(Debug, thiserror::Error)]
 pub enum AnswerError {
     /// It is to another tick.
-    #[error("the answer is to tick {tick}, but tick {sampled} has been sampled")]
+    #[error("the answer is for tick {tick}, but tick {sampled} has been sampled")]
     OtherTick {
         /// Its tick.
         tick: u32,

@@ -16,7 +16,7 @@ use crate::record_file::{Damage, Extent, RecordedMessage, messages};
 #[derive(Debug, thiserror::Error)]
 pub enum ExportError {
     /// The record is damaged, and nothing is exported.
-    #[error("not a complete MCAP file, of which no tick is whole: {0}")]
+    #[error("not a complete MCAP file, and no tick in it is intact: {0}")]
     Incomplete(#[from] Damage),
     /// The record is damaged behind whole ticks.
     #[error(
@@ -37,7 +37,7 @@ pub enum ExportError {
     #[error("no topic /plant, /sensor, /actuator or /estimates: this is not a record of painleve")]
     NoTicks,
     /// A time is later than a bag can hold.
-    #[error("a time by the clock is later than January 2038, the end of the times of ROS 2")]
+    #[error("a wall-clock time is later than January 2038, the end of the times of ROS 2")]
     Late,
     /// What is exported cannot be written.
     #[error(transparent)]

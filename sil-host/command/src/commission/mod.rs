@@ -153,7 +153,7 @@ pub fn run(arguments: &CommissionArguments) -> Result<(), CommandError> {
             None => "--rehearse".to_owned(),
         };
         say(format_args!(
-            "next, the second sensors: painleve commission {} {rig} --second-sensors --output {}",
+            "next, commission the second sensors: painleve commission {} {rig} --second-sensors --output {}",
             word(&output_path),
             word(&output_path.with_extension("second.toml"))
         ))?;

@@ -46,7 +46,7 @@ impl OperatorCommand {
             Self::Unknown(text) => text,
         };
         warn(format_args!(
-            "unknown command {unknown:?}: the return key or stop"
+            "unknown command {unknown:?}: press Return, or type stop"
         ));
         Ok(false)
     }

@@ -134,7 +134,7 @@ impl SlideRig for BoardSlides {
 
     fn repeats(&mut self, reason: &Refusal, force_n: f64) {
         warn(format_args!(
-            "{reason}. Once more, pressed with {force_n} N"
+            "{reason}. Repeating, pressed with {force_n} N"
         ));
     }
 }

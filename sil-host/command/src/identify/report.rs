@@ -130,8 +130,8 @@ fn sentences(found: &Found) -> Vec<String> {
             identified.readings
         ),
         format!(
-            "Its position is known to {:.2} mm plus {:.2} % for the length of link 1; its distance from the edges to {:.2} mm \
-             (of an arm known from its drawing only: {:.1} mm).",
+            "The tip's position is known to {:.2} mm plus {:.2} % for the length of link 1; its distance from the edges to {:.2} mm \
+             (for an arm known only from its drawing: {:.1} mm).",
             1e3 * identified.place_deviation_m,
             100.0 * length_deviation,
             1e3 * identified.tip_deviation_m,
@@ -139,19 +139,19 @@ fn sentences(found: &Found) -> Vec<String> {
         ),
         of_torques,
         format!(
-            "Waves, vibration, unknown torques and the force cell's noise pass for accelerations of the tip off the belt of {:.2} m/s² (root mean square), of which \
+            "Waves, vibration, unknown torques and the force cell's noise act like accelerations of the tip off the belt of {:.2} m/s² (root mean square), from which \
              controller.governor.p_per_kg follows.",
             found.ripple_m_s2
         ),
         format!(
-            "By the slides, the belt is tilted by {} mrad more than belt_tilt_rad says; a level shows this better.",
+            "According to the slides, the belt is tilted by {} mrad more than belt_tilt_rad says; check this with a level.",
             spread(1e3 * tilt.value, 1e3 * tilt.deviation, 0)
         ),
     ];
     let told = found.told_friction;
     if (found.friction / told - 1.0).abs() > OTHER_FRICTION {
         sentences.push(format!(
-            "The friction coefficient of the tip on the belt is {:.2} by the slides, but {told:.2} in the scenario: set belt.friction, of which the place to set the tip down follows.",
+            "The friction coefficient of the tip on the belt is {:.2} according to the slides, but {told:.2} in the scenario: set belt.friction, on which the place to set the tip down depends.",
             found.friction
         ));
     }

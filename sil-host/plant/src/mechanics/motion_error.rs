@@ -23,7 +23,7 @@ pub enum MotionError {
         time_s: f64,
     },
     /// Events follow one another without time passing.
-    #[error("contact events without end at t = {time_s} s")]
+    #[error("endless contact events at t = {time_s} s")]
     EventsWithoutEnd {
         /// Time, s.
         time_s: f64,

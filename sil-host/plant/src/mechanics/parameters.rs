@@ -133,7 +133,8 @@ impl InitialState {
         let [theta_1, theta_2] = match self.tip_m {
             Some(tip_m) => {
                 let arm = Arm::new(*arm)?;
-                let reach_m = arm.reach_on_belt_m();
+                // Whole micrometres, for the message.
+                let reach_m = (1e6 * arm.reach_on_belt_m()).floor() / 1e6;
                 let unreachable = OutOfRange {
                     value: tip_m,
                     minimum: -reach_m,

@@ -164,13 +164,13 @@ pub enum KeyError {
         count: usize,
     },
     /// Another key says the same.
-    #[error("it excludes {other}; give one of the two")]
+    #[error("it cannot be combined with {other}; give one of the two")]
     Excludes {
         /// The other key.
         other: String,
     },
     /// The key means nothing without another.
-    #[error("it needs {other}; give that first")]
+    #[error("{other} is missing; give that first")]
     Needs {
         /// The other key.
         other: String,

@@ -126,7 +126,7 @@ mod tests {
                 &[][..],
                 &[
                     "mine.toml",
-                    "initial.tip_m = 0.3 is outside the allowed range -0.184",
+                    "initial.tip_m = 0.3 is outside the allowed range -0.184102 to 0.184102",
                 ][..],
             ),
             (
@@ -142,12 +142,12 @@ mod tests {
             (
                 "initial = { tip_m = 0.1, theta2_deg = 3.0 }",
                 &[],
-                &["initial.tip_m: it excludes initial.theta2_deg"],
+                &["initial.tip_m: it cannot be combined with initial.theta2_deg"],
             ),
             (
                 "initial.elbow = \"up\"",
                 &[],
-                &["initial.elbow: it needs initial.tip_m"],
+                &["initial.elbow: initial.tip_m is missing"],
             ),
             (
                 "initial = { tip_m = 0.1, elbow = \"left\" }",
