@@ -30,7 +30,9 @@ pub enum StepError {
     #[error(transparent)]
     Board(#[from] BoardError),
     /// The board refuses a probe.
-    #[error("the board refuses to look at {0:#010x}: it drives an arm, or does not list this address")]
+    #[error(
+        "the board refuses to look at {0:#010x}: it drives an arm, or does not list this address"
+    )]
     Probe(u32),
     /// Some answers to probes are missing.
     #[error("{missing} of {sent} answers are missing")]
