@@ -18,6 +18,7 @@ use painleve_study_core::figures::{self, Page, Section};
 use serde_json::{Value, json};
 
 use super::json::JsonOption;
+use super::output::complete;
 use super::output_error::output;
 use super::progress::{Progress, Shown};
 use super::study::outcome::Threads;
@@ -151,7 +152,7 @@ fn simulated(name: &str) -> Result<Section, CommandError> {
     let recorder = Recorder::start(&configuration, vec![Box::new(drawing)]);
     let mut recorder = recorder.map_err(output)?;
     let result = simulate(&scenario, &mut recorder)?;
-    recorder.finish().map_err(output)?;
+    complete(recorder).1?;
     let svg = drawn.recv().unwrap_or_default();
     Ok(figures::run::section(&scenario, &result, svg))
 }

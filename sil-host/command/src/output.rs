@@ -127,8 +127,6 @@ const PROGRESS_TICKS: u64 = 256;
 
 /// The files of a run and its progress bar.
 pub struct Output {
-    /// The files' paths, as they were given.
-    paths: Vec<String>,
     /// `None` if the run writes no file.
     recorder: Option<Recorder>,
     progress: ProgressBar,
@@ -153,12 +151,7 @@ impl Output {
             let configuration = scenario.controller_configuration();
             Some(Recorder::start(&configuration, sinks).map_err(output)?)
         };
-        let paths = arguments
-            .files()
-            .into_iter()
-            .map(|(_, path)| path.display().to_string());
         Ok(Self {
-            paths: paths.collect(),
             recorder,
             progress: progress_bar(scenario.run.ticks()),
             interrupt,
@@ -177,17 +170,26 @@ impl Output {
         }
     }
 
-    /// Completes the files and returns their paths; without this nothing appears under their names.
-    ///
-    /// # Errors
-    /// [`CommandError::Output`] if a file cannot be completed.
-    pub fn finish(self) -> Result<Vec<String>, CommandError> {
+    /// Completes the files; without this nothing appears under their names. Returns the paths of those that are complete,
+    /// and why another is not.
+    pub fn finish(self) -> (Vec<String>, Result<(), CommandError>) {
         self.progress.finish_and_clear();
-        if let Some(recorder) = self.recorder {
-            recorder.finish().map_err(output)?;
-        }
-        Ok(self.paths)
+        self.recorder.map_or((Vec::new(), Ok(())), complete)
     }
+}
+
+/// Completes the files of a recording. Returns the paths of those that are complete, and why another is not; of several,
+/// all but the first are reported.
+pub fn complete(recorder: Recorder) -> (Vec<String>, Result<(), CommandError>) {
+    let recorded = recorder.finish();
+    let mut failures = recorded.failures.into_iter();
+    let first = failures.next().map_or(Ok(()), |error| Err(output(error)));
+    failures.for_each(|error| warn(format_args!("error: {error}")));
+    let paths = recorded.complete.iter();
+    (
+        paths.map(|path| path.display().to_string()).collect(),
+        first,
+    )
 }
 
 /// Returns where what has been measured of an arm is written by default: that of a rehearsal apart from that of a real arm.
@@ -208,11 +210,12 @@ pub fn warn_of_earlier(paths: &[&Path]) {
 
 /// Keeps the partial records of a run that ended early, and reports their paths.
 pub fn keep_partial(recorder: Recorder, reason: &str) {
-    for kept in recorder.finish_partial(reason) {
-        match kept {
-            Ok(path) => warn(format_args!("the partial record is in {}", path.display())),
-            Err(error) => warn(format_args!("a partial record could not be kept: {error}")),
-        }
+    let recorded = recorder.finish_partial(reason);
+    for path in recorded.partial {
+        warn(format_args!("the partial record is in {}", path.display()));
+    }
+    for error in recorded.failures {
+        warn(format_args!("a partial record could not be kept: {error}"));
     }
 }
 

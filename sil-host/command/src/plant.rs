@@ -7,7 +7,7 @@ use painleve_firmware::supervise::lapses::Lapse;
 use painleve_link::lockstep::Lockstep;
 use painleve_link::paced::Paced;
 use painleve_link::{BusName, Pacing, Pair, PlantEnd, Session};
-use painleve_plant::closed_loop::{ClosedLoop, LoopError, LoopResult};
+use painleve_plant::closed_loop::{ClosedLoop, LoopResult};
 use painleve_plant::controller_host::ControllerHost;
 use painleve_plant::scenario::{Scenario, ScenarioError};
 use painleve_plant::simulation::Simulation;
@@ -85,8 +85,10 @@ fn run_until(arguments: &PlantArguments, interrupt: &Interrupt) -> Result<(), Co
     let mut output = Output::open(&arguments.output, &scenario, interrupt.clone())?;
     match simulate(arguments, &scenario, interrupt, &mut output) {
         Ok(mut report) => {
-            report.files = output.finish()?;
+            let (files, written) = output.finish();
+            report.files = files;
             print(&report, arguments.json)?;
+            written?;
             match report.fault.and_then(Fault::from_code) {
                 Some(fault)
                     if arguments.scenario.pacing == Pacing::Realtime && is_of_deadlines(fault) =>
@@ -98,10 +100,8 @@ fn run_until(arguments: &PlantArguments, interrupt: &Interrupt) -> Result<(), Co
         }
         Err(error) => {
             let error = or_interrupted(Err(error), interrupt);
-            match &error {
-                // If the files cannot be written, the partial record cannot be kept either.
-                Ok(()) | Err(CommandError::Loop(LoopError::Monitor(_))) => {}
-                Err(reason) => output.keep_partial(&reason.to_string()),
+            if let Err(reason) = &error {
+                output.keep_partial(&reason.to_string());
             }
             error
         }

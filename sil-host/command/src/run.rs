@@ -267,11 +267,18 @@ pub fn run(arguments: &RunArguments) -> Result<(), CommandError> {
         arguments.patience.peer(),
         &interrupt,
     )?;
-    let deadlines_missed = status.code() == Some(i32::from(DEADLINES_MISSED));
-    if !status.success() && !deadlines_missed {
+    // After these, the plant has printed why, and its report if the run is complete.
+    let is_told = [DEADLINES_MISSED, UNWRITABLE]
+        .into_iter()
+        .any(|code| status.code() == Some(i32::from(code)));
+    if !status.success() && !is_told {
         if status.code() == Some(i32::from(PEER_FAILED)) {
             return Err(peer_failure(&mut plant, &mut controller, status)?);
         }
+        return Err(failure(status));
+    }
+    let text = plant.stdout.text();
+    if is_told && text.is_empty() {
         return Err(failure(status));
     }
     match controller.wait(CONTROLLER_END)? {
@@ -290,7 +297,6 @@ pub fn run(arguments: &RunArguments) -> Result<(), CommandError> {
     if !remarks.is_empty() {
         warn(remarks.trim_end());
     }
-    let text = plant.stdout.text();
     let report: RunReport = serde_json::from_str(&text).map_err(ProcessError::NoReport)?;
     if !arguments.quiet {
         plant::print(&report, arguments.json)?;
@@ -302,7 +308,7 @@ pub fn run(arguments: &RunArguments) -> Result<(), CommandError> {
             report.ticks
         ));
     }
-    if deadlines_missed {
+    if is_told {
         return Err(failure(status));
     }
     fail_on::check(&arguments.fail_on, &report)

@@ -4,7 +4,7 @@
 //! record holds the scenario, and the time by the clock at which the record began.
 
 use std::collections::BTreeMap;
-use std::io::{self, BufWriter};
+use std::io::{self, BufWriter, Write as _};
 use std::path::PathBuf;
 use std::time::SystemTime;
 
@@ -154,12 +154,13 @@ impl McapLog {
         self.writer.write_to_known_channel(&header, &self.json)
     }
 
-    fn complete(mut self) -> Result<AtomicFile, RecordError> {
-        let file = self.writer.finish().and_then(|_| {
-            let buffered = self.writer.into_inner();
-            Ok(buffered.into_inner().map_err(|error| error.into_error())?)
-        });
-        file.map_err(|error| RecordError::write(&self.path, reason(error)))
+    /// Completes the file, or tells why it is not complete.
+    fn close(mut self) -> (AtomicFile, Result<(), RecordError>) {
+        let finished = self.writer.finish();
+        let mut buffered = self.writer.into_inner();
+        let closed = finished.and_then(|_| Ok(buffered.flush()?));
+        let closed = closed.map_err(|error| RecordError::write(&self.path, reason(error)));
+        (buffered.into_parts().0, closed)
     }
 }
 
@@ -178,7 +179,14 @@ impl Sink for McapLog {
     }
 
     fn finish(self: Box<Self>) -> Result<Option<AtomicFile>, RecordError> {
-        Ok(Some(self.complete()?))
+        let (file, closed) = self.close();
+        match closed {
+            Ok(()) => Ok(Some(file)),
+            Err(error) => match file.commit_partial() {
+                Ok(path) => Err(error.but_partly_in(path)),
+                Err(_) => Err(error),
+            },
+        }
     }
 
     /// Writes the reason to a metadata record `ended early`.
@@ -190,10 +198,10 @@ impl Sink for McapLog {
             name: "ended early".to_owned(),
             metadata: BTreeMap::from([("reason".to_owned(), reason_text.to_owned())]),
         };
-        self.writer
-            .write_metadata(&metadata)
-            .map_err(|error| RecordError::write(&self.path, reason(error)))?;
-        Ok(Some(self.complete()?.commit_partial()?))
+        // What a full disk does not take is left out: `export --recover` reads the rest.
+        let _ = self.writer.write_metadata(&metadata);
+        let (file, _) = self.close();
+        Ok(Some(file.commit_partial()?))
     }
 }
 

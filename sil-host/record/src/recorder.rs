@@ -5,6 +5,7 @@
 //! bounded. The thread recomputes the controller's estimates ([`Replica`]) and finds the controller's
 //! events, so that neither costs the loop anything.
 
+use std::collections::VecDeque;
 use std::io;
 use std::mem;
 use std::path::{Path, PathBuf};
@@ -12,7 +13,7 @@ use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::thread::{self, JoinHandle};
 
 use painleve_chart::picture::PictureError;
-use painleve_files::atomic_file::{AtomicFile, AtomicFileError, commit_all};
+use painleve_files::atomic_file::{AtomicFile, AtomicFileError};
 use painleve_plant::closed_loop::{LoopError, Monitor};
 use painleve_plant::sample::Sample;
 use painleve_plant::telemetry::Telemetry;
@@ -43,11 +44,19 @@ pub enum RecordError {
         /// The reason.
         source: io::Error,
     },
+    /// A file cannot be completed, but what has been written is kept.
+    #[error("{failure}; the partial record is in {}", .path.display())]
+    Partial {
+        /// Why it is not complete.
+        failure: Box<Self>,
+        /// The partial file.
+        path: PathBuf,
+    },
     /// The recording thread cannot be started.
     #[error("cannot start the recording thread: {0}; end other processes or run without recording")]
     Thread(io::Error),
-    /// A call after the error that ended the recording.
-    #[error("the recording has already failed; start a new one")]
+    /// The recording thread has panicked.
+    #[error("the recording thread has failed; this is a defect")]
     Ended,
 }
 
@@ -58,6 +67,13 @@ impl RecordError {
             path: path.to_path_buf(),
             source,
         }
+    }
+
+    /// Adds that what has been written is in the file at `path`.
+    #[must_use]
+    pub fn but_partly_in(self, path: PathBuf) -> Self {
+        let failure = Box::new(self);
+        Self::Partial { failure, path }
     }
 }
 
@@ -86,15 +102,15 @@ pub trait Sink: Send {
         Ok(())
     }
 
-    /// Completes the file and returns it, if there is one. It receives its name when all sinks are complete; without
-    /// this call no file is left.
+    /// Completes the file and returns it, if there is one. The recorder gives it its name; without this call no file is
+    /// left.
     ///
     /// # Errors
     /// [`RecordError`] if the file cannot be written.
     fn finish(self: Box<Self>) -> Result<Option<AtomicFile>, RecordError>;
 
-    /// Keeps the file of a run that ended early under a name that marks it as partial, which is
-    /// returned; `None` if a partial file has no use.
+    /// Keeps the file of a run that ended early, or of a sink that has failed, under a name that marks it as partial, which
+    /// is returned; `None` if a partial file has no use.
     ///
     /// # Errors
     /// [`RecordError`] if the file cannot be written.
@@ -105,6 +121,40 @@ pub trait Sink: Send {
 
 /// The sinks of a recording.
 pub type Sinks = Vec<Box<dyn Sink>>;
+
+/// What a recording leaves. A file that fails takes no other with it.
+#[derive(Debug, Default)]
+pub struct Recorded {
+    /// The complete files.
+    pub complete: Vec<PathBuf>,
+    /// The partial files of a run that ended early.
+    pub partial: Vec<PathBuf>,
+    /// Why the others are missing or partial.
+    pub failures: Vec<RecordError>,
+}
+
+impl Recorded {
+    /// Completes the file of a sink.
+    fn complete(&mut self, sink: Box<dyn Sink>) {
+        let completed = sink.finish().and_then(|file| {
+            let path = file.as_ref().map(|file| file.path().to_path_buf());
+            file.map_or(Ok(()), AtomicFile::commit)?;
+            Ok(path)
+        });
+        match completed {
+            Ok(path) => self.complete.extend(path),
+            Err(error) => self.failures.push(error),
+        }
+    }
+
+    /// Keeps the partial file of a sink.
+    fn keep_partial(&mut self, sink: Box<dyn Sink>, reason: &str) {
+        match sink.finish_partial(reason) {
+            Ok(path) => self.partial.extend(path),
+            Err(error) => self.failures.push(error),
+        }
+    }
+}
 
 /// An entry of the recording, as the control loop passes it on.
 #[derive(Clone, Copy, Debug)]
@@ -124,8 +174,17 @@ pub struct Recorder {
 #[derive(Debug)]
 struct RecordingThread {
     full: SyncSender<Vec<Entry>>,
-    empty: Receiver<Vec<Entry>>,
-    thread: JoinHandle<Result<Sinks, RecordError>>,
+    empty: Receiver<Returned>,
+    thread: JoinHandle<Files>,
+}
+
+/// A buffer that the thread returns.
+#[derive(Debug, Default)]
+struct Returned {
+    /// The empty buffer.
+    buffer: Vec<Entry>,
+    /// Why a sink has failed meanwhile.
+    failure: Option<RecordError>,
 }
 
 impl Recorder {
@@ -140,12 +199,18 @@ impl Recorder {
         let (empty_buffers, empty) = sync_channel(BUFFERS);
         for _ in 1..BUFFERS {
             // Cannot fail: the channel has room and its receiver exists.
-            let _ = empty_buffers.send(new_buffer());
+            let _ = empty_buffers.send(Returned {
+                buffer: new_buffer(),
+                failure: None,
+            });
         }
         let recording = Recording {
             replica: Replica::new(configuration),
             events: ControllerEvents::default(),
-            sinks,
+            files: Files {
+                sinks,
+                ..Files::default()
+            },
         };
         let thread = thread::Builder::new()
             .name("recorder".to_owned())
@@ -164,7 +229,7 @@ impl Recorder {
     /// Adds a copy of a sample. Waits only when the sinks are behind by several thousand samples.
     ///
     /// # Errors
-    /// [`RecordError`] if writing earlier samples failed; the recording has then ended.
+    /// [`RecordError`] if writing earlier samples failed. The other sinks go on.
     #[inline]
     pub fn push(&mut self, sample: &Sample) -> Result<(), RecordError> {
         self.buffer.push(Entry::Tick(*sample));
@@ -180,59 +245,66 @@ impl Recorder {
         self.buffer.push(Entry::Event(RunEvent { time_s, kind }));
     }
 
-    /// Records the remaining samples and completes every file.
-    ///
-    /// # Errors
-    /// [`RecordError`] if anything could not be written; no file is left then. Without a figure that cannot be converted
-    /// the others are still complete, and are left.
-    pub fn finish(mut self) -> Result<(), RecordError> {
-        self.hand_over()?;
-        let (mut files, mut unconverted) = (Vec::new(), None);
-        for sink in self.end()? {
-            match sink.finish() {
-                Ok(file) => files.extend(file),
-                Err(RecordError::Picture(error)) => unconverted = Some(error),
-                Err(error) => return Err(error),
-            }
+    /// Records the remaining samples and completes every file that can be written.
+    pub fn finish(mut self) -> Recorded {
+        let (sinks, mut recorded) = self.end();
+        for sink in sinks {
+            recorded.complete(sink);
         }
-        commit_all(files)?;
-        unconverted.map_or(Ok(()), |error| Err(error.into()))
+        recorded
     }
 
-    /// Keeps the recorded part of a run that ended early. Returns the name of each file, or why it could not be kept;
-    /// the others are. Earlier records stay.
-    pub fn finish_partial(mut self, reason: &str) -> Vec<Result<PathBuf, RecordError>> {
-        match self.hand_over().and_then(|()| self.end()) {
-            Ok(sinks) => sinks
-                .into_iter()
-                .filter_map(|sink| sink.finish_partial(reason).transpose())
-                .collect(),
-            Err(error) => vec![Err(error)],
+    /// Keeps the recorded part of a run that ended early. Earlier records stay.
+    pub fn finish_partial(mut self, reason: &str) -> Recorded {
+        let (sinks, mut recorded) = self.end();
+        for sink in sinks {
+            recorded.keep_partial(sink, reason);
         }
+        recorded
     }
 
     #[cold]
     fn hand_over(&mut self) -> Result<(), RecordError> {
-        let handed_over = self.thread.as_ref().and_then(|thread| {
-            let empty = thread.empty.recv().ok()?;
-            let full = mem::replace(&mut self.buffer, empty);
-            thread.full.send(full).ok()
-        });
-        if handed_over.is_some() {
-            return Ok(());
-        }
-        // A closed channel means that the thread has stopped: its result holds the reason.
-        self.buffer.clear();
-        self.end().and(Err(RecordError::Ended))
+        let RecordingThread { full, empty, .. } = self.thread.as_ref().ok_or(RecordError::Ended)?;
+        // A closed channel means that the thread has panicked.
+        let Returned { buffer, failure } = empty.recv().map_err(|_| RecordError::Ended)?;
+        let sent = full.send(mem::replace(&mut self.buffer, buffer));
+        sent.map_err(|_| RecordError::Ended)?;
+        failure.map_or(Ok(()), Err)
     }
 
-    /// Stops the thread and takes back the sinks.
-    fn end(&mut self) -> Result<Sinks, RecordError> {
-        let Some(RecordingThread { full, thread, .. }) = self.thread.take() else {
-            return Err(RecordError::Ended);
+    /// Hands over the remaining samples, stops the thread, and takes back the sinks that have not failed, with what the
+    /// others leave.
+    fn end(&mut self) -> (Sinks, Recorded) {
+        let Some(RecordingThread {
+            full,
+            empty,
+            thread,
+        }) = self.thread.take()
+        else {
+            return Default::default();
         };
+        // Fails only if the thread has panicked.
+        let _ = full.send(mem::take(&mut self.buffer));
         drop(full);
-        thread.join().unwrap_or(Err(RecordError::Ended))
+        let ended = thread.join();
+        let returned = empty.iter().filter_map(|returned| returned.failure);
+        let mut failures: Vec<_> = returned.collect();
+        let sinks = match ended {
+            Ok(files) => {
+                failures.extend(files.failures);
+                files.sinks
+            }
+            Err(_) => {
+                failures.push(RecordError::Ended);
+                Sinks::new()
+            }
+        };
+        let recorded = Recorded {
+            failures,
+            ..Recorded::default()
+        };
+        (sinks, recorded)
     }
 }
 
@@ -263,31 +335,28 @@ fn new_buffer() -> Vec<Entry> {
 struct Recording {
     replica: Option<Replica>,
     events: ControllerEvents,
-    sinks: Sinks,
+    files: Files,
 }
 
 impl Recording {
     /// Runs until the recorder closes its channel.
-    fn run(
-        mut self,
-        full: &Receiver<Vec<Entry>>,
-        empty: &SyncSender<Vec<Entry>>,
-    ) -> Result<Sinks, RecordError> {
+    fn run(mut self, full: &Receiver<Vec<Entry>>, empty: &SyncSender<Returned>) -> Files {
         for mut buffer in full {
             for entry in &buffer {
                 match entry {
-                    Entry::Tick(sample) => self.tick(sample)?,
-                    Entry::Event(event) => self.event(event)?,
+                    Entry::Tick(sample) => self.tick(sample),
+                    Entry::Event(event) => self.event(event),
                 }
             }
             buffer.clear();
-            // Fails only when the recorder is ending and takes no more buffers.
-            let _ = empty.send(buffer);
+            let failure = self.files.failures.pop_front();
+            // The channel has room for every buffer. Fails only when nobody takes them back.
+            let _ = empty.send(Returned { buffer, failure });
         }
-        Ok(self.sinks)
+        self.files
     }
 
-    fn tick(&mut self, sample: &Sample) -> Result<(), RecordError> {
+    fn tick(&mut self, sample: &Sample) {
         if let Some(replica) = &mut self.replica
             && !replica.follow(sample)
         {
@@ -295,23 +364,51 @@ impl Recording {
             self.event(&RunEvent {
                 time_s: sample.plant.time_s,
                 kind: EventKind::EstimatesEnd,
-            })?;
+            });
         }
         for kind in self.events.take_in(&sample.actuator).into_iter().flatten() {
             self.event(&RunEvent {
                 time_s: sample.plant.time_s,
                 kind,
-            })?;
+            });
         }
         let tick = RecordedTick {
             sample,
             estimates: self.replica.as_ref().map(Replica::telemetry),
         };
-        self.sinks.iter_mut().try_for_each(|sink| sink.tick(&tick))
+        self.files.write(|sink| sink.tick(&tick));
     }
 
-    fn event(&mut self, event: &RunEvent) -> Result<(), RecordError> {
-        self.sinks.iter_mut().try_for_each(|sink| sink.event(event))
+    fn event(&mut self, event: &RunEvent) {
+        self.files.write(|sink| sink.event(event));
+    }
+}
+
+/// What the recording thread writes.
+#[derive(Default)]
+struct Files {
+    /// The sinks that have not failed.
+    sinks: Sinks,
+    /// Failures of the others that have not been returned with a buffer.
+    failures: VecDeque<RecordError>,
+}
+
+impl Files {
+    /// Writes something to all sinks. One that fails leaves its partial file; the others go on.
+    fn write(&mut self, write: impl Fn(&mut dyn Sink) -> Result<(), RecordError>) {
+        let mut index = 0;
+        while let Some(sink) = self.sinks.get_mut(index) {
+            let Err(error) = write(sink.as_mut()) else {
+                index += 1;
+                continue;
+            };
+            let partial = self.sinks.remove(index).finish_partial(&error.to_string());
+            self.failures.push_back(match partial {
+                Ok(Some(path)) => error.but_partly_in(path),
+                // If that cannot be written either, it is for the same reason.
+                Ok(None) | Err(_) => error,
+            });
+        }
     }
 }
 
@@ -334,24 +431,21 @@ mod tests {
     }
 
     #[test]
-    fn a_figure_that_cannot_be_converted_does_not_take_the_record_with_it() {
+    fn a_file_that_fails_at_the_end_takes_no_other_with_it() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("run.mcap");
         let scenario = Scenario::load("edge", &[]).unwrap();
-        let finished = |error: RecordError| {
-            let file = AtomicFile::create(&path).unwrap();
-            let sinks = [Ending(Err(error)), Ending(Ok(file))];
-            let sinks = sinks.map(|sink| Box::new(sink) as Box<dyn Sink>);
-            let configuration = scenario.controller_configuration();
-            let recorder = Recorder::start(&configuration, sinks.into()).unwrap();
-            (recorder.finish().unwrap_err(), path.exists())
+        let file = AtomicFile::create(&path).unwrap();
+        let failure = PictureError::Failed("no memory".into());
+        let sinks = [Ending(Err(failure.into())), Ending(Ok(file))];
+        let sinks = sinks.map(|sink| Box::new(sink) as Box<dyn Sink>);
+        let configuration = scenario.controller_configuration();
+        let recorder = Recorder::start(&configuration, sinks.into()).unwrap();
+        let recorded = recorder.finish();
+        let [error] = recorded.failures.as_slice() else {
+            panic!("{recorded:?}");
         };
-        let (error, is_there) = finished(RecordError::Ended);
-        assert!(matches!(error, RecordError::Ended) && !is_there);
-        let (error, is_there) = finished(PictureError::Failed("no memory".into()).into());
-        assert!(
-            error.to_string().ends_with("no memory") && is_there,
-            "{error}"
-        );
+        assert!(error.to_string().ends_with("no memory"), "{error}");
+        assert!(path.exists() && recorded.complete == [path]);
     }
 }

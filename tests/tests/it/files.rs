@@ -503,7 +503,7 @@ fn names_that_are_not_text_are_used_as_they_are() {
 }
 
 #[test]
-fn a_file_size_limit_is_reported_and_leaves_no_file_of_a_run() {
+fn a_file_size_limit_costs_a_run_the_files_that_are_larger() {
     let bench = Bench::new("limits");
     // Page and figure of this run are smaller than its table.
     let whole = run(
@@ -522,17 +522,30 @@ fn a_file_size_limit_is_reported_and_leaves_no_file_of_a_run() {
     }
     let kib = size(largest) / 1024;
     fs::remove_dir_all(bench.path("out")).unwrap_or_default();
-    for kib in [kib, kib / 2, kib / 8, 1] {
+    for (kib, complete) in [
+        (kib, &["out/run.html", "out/run.mcap", "out/run.svg"][..]),
+        (kib / 5, &["out/run.svg"]),
+        // Not even the head of the record, so that nothing runs.
+        (1, &[]),
+    ] {
         let line =
             format!("ulimit -f {kib}; $P run edge --set run.duration_s=0.6 --csv out/run.csv");
         let output = bench.shell(&line);
         assert_eq!(code(output.status), 4, "{kib}: {output:?}");
         let message = errors(&output);
-        assert_eq!(message.trim().lines().count(), 1, "{kib}: {message}");
-        assert!(message.contains("out/run."), "{kib}: {message}");
-        assert_eq!(bench.files(), [""; 0], "{kib} KiB");
+        let lost = if kib == 1 { 1 } else { 4 - complete.len() };
+        assert_eq!(message.trim().lines().count(), lost, "{kib}: {message}");
+        let of_files = message.matches("cannot write `out/run.").count();
+        assert_eq!(of_files, lost, "{kib}: {message}");
+        // The report comes all the same.
+        let report = String::from_utf8_lossy(&output.stdout);
+        assert_eq!(report.contains("log hash"), kib > 1, "{kib}: {report}");
+        let files = bench.files();
+        let whole = files.iter().filter(|name| !name.contains("partial"));
+        assert!(whole.eq(complete), "{kib} KiB: {files:?}");
+        fs::remove_dir_all(bench.path("out")).unwrap_or_default();
     }
-    // Also of other commands that write several files.
+    // Files of other commands appear together.
     for line in [
         "man manual".to_owned(),
         format!("{STUDY} --csv s.csv --svg s.svg"),

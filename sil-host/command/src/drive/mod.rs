@@ -28,7 +28,7 @@ use self::operator::OperatorCommand;
 pub use self::operator::{Ended, Operator};
 use self::view::View;
 use super::distinct_files::check_distinct;
-use super::output::keep_partial;
+use super::output::{complete, keep_partial};
 use super::output_error::{InputError, output};
 use super::process_error::ProcessError;
 use super::{CommandError, say};
@@ -128,9 +128,7 @@ pub fn run(arguments: &DriveArguments) -> Result<(), CommandError> {
         }
         return Err(error);
     }
-    if let Some(recorder) = recorder {
-        recorder.finish().map_err(output)?;
-    }
+    let written = recorder.map_or(Ok(()), |recorder| complete(recorder).1);
     let report = drive.report;
     say(if arguments.json {
         serde_json::to_string(&report).map_err(output)?
@@ -140,6 +138,7 @@ pub fn run(arguments: &DriveArguments) -> Result<(), CommandError> {
             report.scenario, report.ticks, report.active_ticks, report.lost_ticks, report.state
         )
     })?;
+    written?;
     painleve_shared::status::Fault::from_code(report.fault)
         .map_or(Ok(()), |fault| Err(CommandError::Faulted(fault)))
 }

@@ -36,7 +36,7 @@ pub(crate) fn record(folder: &Path, scenario: &Scenario) -> (Vec<u8>, String) {
     for _ in 0..scenario.run.ticks() {
         closed_loop.tick(&mut recorder).unwrap();
     }
-    recorder.finish().unwrap();
+    assert!(recorder.finish().failures.is_empty());
     (fs::read(mcap).unwrap(), fs::read_to_string(csv).unwrap())
 }
 
@@ -224,7 +224,7 @@ fn estimates_end_where_the_answers_are_another_controllers() {
     };
     sample.actuator.torques[0].0 = 77;
     recorder.push(&sample).unwrap();
-    recorder.finish().unwrap();
+    assert!(recorder.finish().failures.is_empty());
     let messages = messages(&fs::read(&path).unwrap());
     assert!(of_topic(&messages, "/estimates").is_empty());
     assert_eq!(of_topic(&messages, "/events")[0]["kind"], "estimates-end");
@@ -257,7 +257,7 @@ fn values_that_are_not_finite_are_left_out() {
             ..Sample::default()
         })
         .unwrap();
-    recorder.finish().unwrap();
+    assert!(recorder.finish().failures.is_empty());
     let messages = messages(&fs::read(&path).unwrap());
     let plant = of_topic(&messages, "/plant")[0];
     assert!(plant.get("b_m_s2").is_none() && plant.get("normal_force_n").is_none());
@@ -268,7 +268,8 @@ fn values_that_are_not_finite_are_left_out() {
 fn an_empty_recording_is_a_valid_file() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("run.mcap");
-    start(&path, None).unwrap().finish().unwrap();
+    let recorded = start(&path, None).unwrap().finish();
+    assert_eq!(recorded.complete, std::slice::from_ref(&path));
     assert!(messages(&fs::read(&path).unwrap()).is_empty());
 }
 
@@ -298,33 +299,76 @@ fn an_unwritable_path_is_refused_at_once_and_named() {
 }
 
 #[test]
-fn a_full_disk_ends_the_recording_with_one_error_and_leaves_no_file() {
+fn a_full_disk_leaves_what_has_been_written_and_is_told_once() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("run.mcap");
-    let is_reported = |error: RecordError| {
-        assert!(matches!(error, RecordError::Write { .. }), "{error}");
-        assert!(error.to_string().contains("run.mcap"), "{error}");
-        assert!(error.to_string().contains("no storage space"), "{error}");
+    let partial = folder.path().join("run.partial.mcap");
+    let is_reported = |error: &RecordError| {
+        let text = error.to_string();
+        assert!(text.contains("run.mcap"), "{text}");
+        assert!(text.contains("no storage space"), "{text}");
     };
 
     // At the start …
-    is_reported(start(&path, Some(0)).unwrap_err());
+    is_reported(&start(&path, Some(0)).unwrap_err());
+    assert!(fs::read_dir(folder.path()).unwrap().next().is_none());
 
     // … while running …
-    let mut recorder = start(&path, Some(100_000)).unwrap();
-    is_reported(
-        (0..)
-            .find_map(|_| recorder.push(&Sample::default()).err())
-            .unwrap(),
+    let mut recorder = start(&path, Some(300_000)).unwrap();
+    let mut sample = Sample::default();
+    let error = (0..)
+        .find_map(|tick| {
+            sample.plant.time_s = f64::from(tick) * 1e-3;
+            recorder.push(&sample).err()
+        })
+        .unwrap();
+    is_reported(&error);
+    let RecordError::Partial { path: kept, .. } = error else {
+        panic!("{error}");
+    };
+    assert_eq!(kept, partial);
+    let recorded = recorder.finish_partial("no space");
+    assert!(
+        recorded.failures.is_empty() && recorded.partial.is_empty(),
+        "{recorded:?}"
     );
-    let error = recorder.finish().unwrap_err();
-    assert!(matches!(error, RecordError::Ended), "{error}");
+    let recovered = ticks_to_csv(&fs::read(&partial).unwrap()[..], std::io::sink()).unwrap();
+    assert!(recovered.damage.is_some() && recovered.rows > 0);
+    fs::remove_file(&partial).unwrap();
 
     // … or, in a short run, at the end.
     let mut recorder = start(&path, Some(45_000)).unwrap();
     recorder.push(&Sample::default()).unwrap();
-    is_reported(recorder.finish().unwrap_err());
-    assert!(fs::read_dir(folder.path()).unwrap().next().is_none());
+    let recorded = recorder.finish();
+    let [error] = recorded.failures.as_slice() else {
+        panic!("{recorded:?}");
+    };
+    is_reported(error);
+    assert!(recorded.complete.is_empty() && partial.exists() && !path.exists());
+}
+
+#[test]
+fn a_file_that_fails_leaves_the_others_to_go_on() {
+    let folder = tempfile::tempdir().unwrap();
+    let scenario = scenario("edge", &[]);
+    let file = |name: &str| AtomicFile::create(folder.path().join(name)).unwrap();
+    let mut full = file("run.csv");
+    full.room = 10_000;
+    let sinks: Vec<Box<dyn Sink>> = vec![
+        Box::new(CsvTable::to(full).unwrap()),
+        Box::new(CsvTable::to(file("second.csv")).unwrap()),
+    ];
+    let mut recorder = Recorder::start(&scenario.controller_configuration(), sinks).unwrap();
+    let mut failures = 0;
+    for _ in 0..10_000 {
+        failures += usize::from(recorder.push(&Sample::default()).is_err());
+    }
+    let recorded = recorder.finish();
+    assert_eq!((failures, recorded.failures.len()), (1, 0));
+    let path = folder.path().join("second.csv");
+    assert_eq!(fs::read_to_string(&path).unwrap().lines().count(), 10_001);
+    assert_eq!(recorded.complete, [path]);
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
 }
 
 #[test]
@@ -353,9 +397,9 @@ fn a_partial_file_that_cannot_be_written_leaves_the_others() {
     ];
     let mut recorder = Recorder::start(&scenario.controller_configuration(), sinks).unwrap();
     recorder.push(&Sample::default()).unwrap();
-    let kept = recorder.finish_partial("stopped");
-    let [Ok(record), Err(error), Ok(table)] = kept.as_slice() else {
-        panic!("{kept:?}");
+    let recorded = recorder.finish_partial("stopped");
+    let ([record, table], [error]) = (&recorded.partial[..], &recorded.failures[..]) else {
+        panic!("{recorded:?}");
     };
     assert!(record.exists() && table.exists());
     assert!(error.to_string().contains("run.csv"), "{error}");
