@@ -75,12 +75,6 @@ impl BeltEstimator {
         }
     }
 
-    /// Returns the lowest and highest speed that the belt may have, m/s.
-    #[cfg(test)]
-    fn bounds_m_s(&self) -> (f32, f32) {
-        (self.slowest_m_s, self.fastest_m_s)
-    }
-
     /// Returns whether the bounds allow a belt as fast as a tip with this velocity (m/s), which is then in
     /// stick.
     pub fn may_stick(&self, tip_velocity_m_s: f32) -> bool {
@@ -97,6 +91,13 @@ impl BeltEstimator {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    impl BeltEstimator {
+        /// Returns the lowest and highest speed that the belt may have, m/s.
+        fn bounds_m_s(&self) -> (f32, f32) {
+            (self.slowest_m_s, self.fastest_m_s)
+        }
+    }
 
     fn friction(slip: Slip, sticks: bool) -> FrictionEstimate {
         FrictionEstimate {

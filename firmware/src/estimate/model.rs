@@ -98,18 +98,6 @@ impl Model {
         }
     }
 
-    /// The same without the pose.
-    #[cfg(test)]
-    pub fn new(
-        arm: &Arm<f32>,
-        theta_rad: LinkMotion<f32>,
-        theta_dot_rad_s: LinkMotion<f32>,
-        disturbance_nm: &GeneralisedTorque<f32>,
-    ) -> Self {
-        let pose = Pose::new(&theta_rad);
-        Self::in_pose(arm, &pose, theta_rad, theta_dot_rad_s, disturbance_nm)
-    }
-
     /// Moves the model to these link angles θ (rad) and rates θ̇ (rad/s) nearby, to first order: the tip, and everything that
     /// the inverse dynamics need. M⁻¹, Q, det J and the slope of the free normal acceleration stay those of the predicted
     /// state, from which the readings are a count or so away.
@@ -220,6 +208,20 @@ impl Model {
     /// p = Q22 − μ s Q12, 1/kg.
     pub fn p_per_kg(&self, friction: &FrictionEstimate) -> f32 {
         self.q22_per_kg - friction.coefficient * friction.slip.sign::<f32>() * self.q12_per_kg
+    }
+}
+
+#[cfg(test)]
+impl Model {
+    /// Evaluates the terms without the pose.
+    pub fn new(
+        arm: &Arm<f32>,
+        theta_rad: LinkMotion<f32>,
+        theta_dot_rad_s: LinkMotion<f32>,
+        disturbance_nm: &GeneralisedTorque<f32>,
+    ) -> Self {
+        let pose = Pose::new(&theta_rad);
+        Self::in_pose(arm, &pose, theta_rad, theta_dot_rad_s, disturbance_nm)
     }
 }
 

@@ -66,9 +66,9 @@ pub struct ContactResponse {
     pub probe_n: f32,
 }
 
+#[cfg(test)]
 impl ContactResponse {
     /// The response of a rigid contact at this p/Q22.
-    #[cfg(test)]
     pub fn rigid(p_ratio: f32) -> Self {
         Self {
             loop_share: EACH_LOOP * p_ratio.at_least(0.0),
