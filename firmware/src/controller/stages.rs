@@ -79,10 +79,11 @@ impl<L: Law> Controller<L> {
         let turn = self.turn.take();
         let (estimates, observed) = (&mut self.estimates, &self.observed);
         let touches = estimates.contact.touches;
+        // Compiled for each case: an update in contact, the longest, is none that searches in the air.
         if touches {
-            estimates.learn_in_contact(observed, turn);
+            estimates.learn(true, observed, turn);
         } else {
-            estimates.learn_in_the_air(observed, turn);
+            estimates.learn(false, observed, turn);
         }
         // A tip that is being returned to the belt needs the edges soon.
         if turn == Turn::Edges || (!touches && self.references.asks_for_landing) {

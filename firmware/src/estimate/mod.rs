@@ -166,62 +166,51 @@ impl Estimators {
         force_n.x.abs() < range_n && force_n.y.abs() < range_n
     }
 
-    /// Updates friction, belt and response of a contact with the force at the last tick, and what has this turn.
-    #[inline]
-    pub fn learn_in_contact(&mut self, observed: &Observed, turn: Turn) {
+    /// Updates friction, belt and response of the contact with the readings of the last tick, at which the tip `touches` or
+    /// not, and what has this turn.
+    #[inline(always)]
+    pub fn learn(&mut self, touches: bool, observed: &Observed, turn: Turn) {
         let is_informative = self.add_to_balance(observed);
         let is_in_range = self.is_in_range();
         let (model, contact) = (&self.model, &mut self.contact);
         let friction = &mut contact.friction;
-        if is_in_range {
+        if touches && is_in_range {
             self.friction_filter.update(friction, &contact.force_n);
+        } else if contact.leaves {
+            let at_rest = self.belt.slip_at_rest();
+            self.friction_filter.leave(friction, at_rest);
         }
         self.belt.update(
             model.tip_velocity_m_s.x,
-            Some(friction),
+            touches.then_some(friction),
             observed.elapsed_ticks,
         );
         let p_per_kg = contact.p_per_kg;
-        let slides = p_per_kg > 0.0 && !friction.sticks;
-        if is_informative && slides && !observed.saturated && self.response.settings.enabled {
+        let slides = touches && p_per_kg > 0.0 && !contact.friction.sticks;
+        let responds =
+            is_informative && slides && !observed.saturated && self.response.settings.enabled;
+        if responds {
             let slope = &model.free_slope_per_kg_m;
             let withheld_n = observed.rounding_nm.vector().dot(slope) / p_per_kg;
             self.response
                 .update(contact.force_n.y, withheld_n, observed.elapsed_ticks);
-            match turn {
-                Turn::Average => self.response.average(),
-                Turn::Bound => self.response.bound(),
-                Turn::Balance | Turn::Edges => {}
-            }
         } else {
             self.response.pause();
         }
-        if turn == Turn::Balance {
-            self.balance_torques();
-            // The gap of a tip that certainly touches shows the links' length. An unchanged reading would gain weight
-            // merely with time.
-            if observed.drove && self.detector.is_certain() && self.joints.moved {
-                let gap_m = self.gap_m();
-                self.calibrator.update(&mut self.arm, gap_m);
+        match turn {
+            Turn::Balance => {
+                self.balance_torques();
+                // The gap of a tip that certainly touches shows the links' length. An unchanged reading would gain weight
+                // merely with time.
+                let is_certain = touches && self.detector.is_certain();
+                if is_certain && observed.drove && self.joints.moved {
+                    let gap_m = self.gap_m();
+                    self.calibrator.update(&mut self.arm, gap_m);
+                }
             }
-        }
-    }
-
-    /// Updates friction and belt at a tick without contact, and what has this turn.
-    #[inline]
-    pub fn learn_in_the_air(&mut self, observed: &Observed, turn: Turn) {
-        if self.contact.leaves {
-            let at_rest = self.belt.slip_at_rest();
-            self.friction_filter
-                .leave(&mut self.contact.friction, at_rest);
-        }
-        let tip_velocity_m_s = self.model.tip_velocity_m_s.x;
-        self.belt
-            .update(tip_velocity_m_s, None, observed.elapsed_ticks);
-        self.response.pause();
-        self.add_to_balance(observed);
-        if turn == Turn::Balance {
-            self.balance_torques();
+            Turn::Average if responds => self.response.average(),
+            Turn::Bound if responds => self.response.bound(),
+            Turn::Average | Turn::Bound | Turn::Edges => {}
         }
     }
 

@@ -33,7 +33,7 @@ fn within_the_budget(name: &str) -> Bound {
     // The worst tick returns the tip to the belt or follows a law; the worst update learns in contact.
     for (handler, parts) in [
         (&bound.control, ["estimate::", "refer::", "drive::"]),
-        (&bound.update, ["learn_in_contact", "refer::", "drive::"]),
+        (&bound.update, ["Estimators::learn", "refer::", "drive::"]),
     ] {
         let sum: u32 = handler.path.iter().map(|stretch| stretch.cycles).sum();
         assert!(
