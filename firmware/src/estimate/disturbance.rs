@@ -12,6 +12,7 @@
 use nalgebra::Vector2;
 use painleve_shared::{GeneralisedTorque, JointTorque, LinkMotion, Real, settings};
 
+use crate::estimate::ContactEstimate;
 use crate::estimate::model::Model;
 use crate::schedule::Turn;
 
@@ -63,10 +64,9 @@ impl DisturbanceEstimator {
     }
 
     /// Updates the estimate of an arm whose `model` includes the present d with the ticks added since the last update.
-    /// `p_ratio` is p/Q22 of a tip in contact, `loop_share` the part of the force error that a loop through the contact may
-    /// remove in a tick.
-    #[inline]
-    pub fn update(&mut self, model: &Model, p_ratio: Option<f32>, loop_share: f32) {
+    /// In contact, the estimate is slower.
+    #[inline(never)]
+    pub fn update(&mut self, model: &Model, contact: &ContactEstimate) {
         let rate_rad_s = model.theta_dot_rad_s;
         let acted = core::mem::take(&mut self.acted);
         if acted.ticks == 0.0 {
@@ -90,9 +90,12 @@ impl DisturbanceEstimator {
         }
         // Limited by the contact's response alone, without p/Q22, fewer runs were kept (lab book, *Parts of the friction
         // estimate left out*).
-        let weight = p_ratio.map_or(self.weight.at_most(1.0), |p_ratio| {
-            (self.weight * p_ratio.at_most(1.0)).limited(0.0, loop_share)
-        });
+        let weight = if contact.touches {
+            let p_ratio = contact.p_per_kg / model.q22_per_kg;
+            (self.weight * p_ratio.at_most(1.0)).limited(0.0, contact.response.loop_share)
+        } else {
+            self.weight.at_most(1.0)
+        };
         self.torque_nm =
             (self.torque_nm + residual_nm * weight).map(|torque| torque.within(limit_nm));
     }
@@ -132,6 +135,17 @@ mod tests {
 
     const TICK_S: f32 = 1e-3;
 
+    /// Returns a contact at this p/Q22, whose response allows everything; without it, the tip is in the air.
+    fn at_p_ratio(model: &Model, p_ratio: Option<f32>) -> ContactEstimate {
+        let mut contact = ContactEstimate {
+            touches: p_ratio.is_some(),
+            p_per_kg: p_ratio.unwrap_or(0.0) * model.q22_per_kg,
+            ..Default::default()
+        };
+        contact.response.loop_share = 1.0;
+        contact
+    }
+
     /// Runs the estimator on an arm with an unknown torque, moving with a constant acceleration under a
     /// contact force; returns the final estimate.
     fn observed(
@@ -150,7 +164,7 @@ mod tests {
             let model = Model::new(&arm, theta, rate, &estimator.torque_nm);
             let torque_nm = truth.inverse_dynamics_nm(&acceleration, &force_n);
             estimator.add(&torque_nm, &force_n, 1);
-            estimator.update(&model, p_ratio, 1.0);
+            estimator.update(&model, &at_p_ratio(&model, p_ratio));
         }
         estimator.torque_nm
     }
@@ -207,7 +221,7 @@ mod tests {
             let force_n = Vector2::zeros();
             let torque_nm = model.inverse_dynamics_nm(&LinkMotion::zeros(), &force_n);
             estimator.add(&torque_nm, &force_n, 1);
-            estimator.update(&model, None, 1.0);
+            estimator.update(&model, &ContactEstimate::default());
         }
         estimator.torque_nm
     }
@@ -233,7 +247,7 @@ mod tests {
             }
             let theta = LinkMotion::new(-0.3, 0.7);
             let model = Model::new(&arm, theta, rate, &estimator.torque_nm);
-            estimator.update(&model, None, 1.0);
+            estimator.update(&model, &ContactEstimate::default());
             let found_nm = estimator.torque_nm.amax();
             assert!(found_nm < 3e-4, "{round}: {found_nm}");
         }

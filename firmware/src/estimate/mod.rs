@@ -199,7 +199,7 @@ impl Estimators {
         }
         match turn {
             Turn::Balance => {
-                self.balance_torques();
+                self.disturbance.update(&self.model, &self.contact);
                 // The gap of a tip that certainly touches shows the links' length. An unchanged reading would gain weight
                 // merely with time.
                 let is_certain = touches && self.detector.is_certain();
@@ -265,15 +265,5 @@ impl Estimators {
         let response = self.response.response(p_per_kg, p_ratio);
         contact.p_per_kg = p_per_kg;
         contact.response = response;
-    }
-
-    /// Updates the disturbance.
-    #[inline(never)]
-    fn balance_torques(&mut self) {
-        let contact = &self.contact;
-        let p_ratio = contact.p_per_kg / self.model.q22_per_kg;
-        let p_ratio = contact.touches.then_some(p_ratio);
-        let loop_share = contact.response.loop_share;
-        self.disturbance.update(&self.model, p_ratio, loop_share);
     }
 }
