@@ -121,7 +121,7 @@ impl References {
         Target {
             reference: if recovering {
                 // It stays where the tip left it, and starts again from where the tip lands.
-                self.governor.present()
+                TipReference::at_rest(self.governor.last.position_m)
             } else if drives {
                 self.governor.govern(&wanted)
             } else {

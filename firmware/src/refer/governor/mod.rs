@@ -55,9 +55,8 @@ pub struct EdgeGovernor {
     searched_for: Option<(Posture, f32)>,
     /// Whether both edges have been found for it.
     found: bool,
-    /// The last reference followed: position (m) and velocity (m/s).
-    position_m: f32,
-    velocity_m_s: f32,
+    /// The last reference followed.
+    pub(super) last: TipReference,
     /// Whether it was equal to the given reference.
     follows: bool,
     /// Whether the given reference is beyond an edge, which holds it back.
@@ -79,8 +78,7 @@ impl EdgeGovernor {
             search: Search::start(1.0, 0.0),
             searched_for: None,
             found: false,
-            position_m: 0.0,
-            velocity_m_s: 0.0,
+            last: TipReference::default(),
             follows: false,
             at_edge: false,
             settings: *settings,
@@ -91,8 +89,7 @@ impl EdgeGovernor {
 
     /// Restarts from a tip at rest at `tip_t_m`, from where it catches up with the reference.
     pub fn restart(&mut self, tip_t_m: f32) {
-        self.position_m = tip_t_m;
-        self.velocity_m_s = 0.0;
+        self.last = TipReference::at_rest(tip_t_m);
         self.follows = false;
     }
 
@@ -104,11 +101,6 @@ impl EdgeGovernor {
     /// Returns whether both edges have been found for the posture that is searched, or are not to be kept.
     pub fn knows_edges(&self) -> bool {
         self.found || !self.settings.enabled
-    }
-
-    /// Returns the last reference at rest: the position to hold while nothing can follow.
-    pub fn present(&self) -> TipReference {
-        TipReference::at_rest(self.position_m)
     }
 
     /// Continues the search for the edges around a tip at `tip_t_m` (m). Where a thrown tip may land,
@@ -174,9 +166,10 @@ impl EdgeGovernor {
 
     /// Returns the reference to follow instead of `wanted`, one tick after the last one.
     pub fn govern(&mut self, wanted: &TipReference) -> TipReference {
-        let (tick_s, braking_m_s2) = (self.tick_s, self.settings.braking_m_s2);
+        let (before, tick_s) = (self.last, self.tick_s);
+        let braking_m_s2 = self.settings.braking_m_s2;
         if !self.settings.enabled {
-            self.position_m = wanted.position_m;
+            self.last = *wanted;
             return *wanted;
         }
         let (lower, upper) = (self.stretch.lower_m, self.stretch.upper_m);
@@ -186,12 +179,11 @@ impl EdgeGovernor {
         self.at_edge = outside(wanted.position_m);
         // A reference that moves or is about to is on its way of one tick, or this far from it.
         let half_way_m = 0.5 * speed * tick_s;
-        let away_m = (wanted.position_m - self.position_m - half_way_m).abs() - half_way_m.abs();
+        let away_m = (wanted.position_m - before.position_m - half_way_m).abs() - half_way_m.abs();
         let near_m = if self.follows { NEAR_M } else { CAUGHT_M };
         self.follows = !self.at_edge && !outside(stop_m) && away_m < near_m;
         if self.follows {
-            self.position_m = wanted.position_m;
-            self.velocity_m_s = speed;
+            self.last = *wanted;
             return *wanted;
         }
         // The highest speed from which the reference still stops within a distance.
@@ -201,26 +193,24 @@ impl EdgeGovernor {
                 .at_most(APPROACH_PER_S * distance)
         };
         let target = wanted.position_m.limited(lower, upper);
-        let away = target - self.position_m;
+        let away = target - before.position_m;
         let approach = stopping_speed(away.abs()).at_most(self.settings.catch_up_m_s);
         let moves_along = if self.at_edge { 0.0 } else { speed };
         let velocity = (moves_along + approach.copysign(away)).limited(
-            -stopping_speed((self.position_m - lower).at_least(0.0)),
-            stopping_speed((upper - self.position_m).at_least(0.0)),
+            -stopping_speed((before.position_m - lower).at_least(0.0)),
+            stopping_speed((upper - before.position_m).at_least(0.0)),
         );
         // Beyond an edge that has moved inwards, the limit above only forbids going further out. Twice the braking, so that
         // the velocity follows a stopping speed, which falls by one in a tick, with a margin.
         let step = 2.0 * braking_m_s2 * tick_s;
-        let change = (velocity - self.velocity_m_s).within(step);
-        let velocity = self.velocity_m_s + change;
-        let acceleration = change / tick_s;
-        self.velocity_m_s = velocity;
-        self.position_m += velocity * tick_s;
-        TipReference {
-            position_m: self.position_m,
+        let change = (velocity - before.velocity_m_s).within(step);
+        let velocity = before.velocity_m_s + change;
+        self.last = TipReference {
+            position_m: before.position_m + velocity * tick_s,
             velocity_m_s: velocity,
-            acceleration_m_s2: acceleration,
-        }
+            acceleration_m_s2: change / tick_s,
+        };
+        self.last
     }
 }
 
