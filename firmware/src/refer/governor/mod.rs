@@ -168,20 +168,17 @@ impl EdgeGovernor {
     pub fn govern(&mut self, wanted: &TipReference) -> TipReference {
         let (before, tick_s) = (self.last, self.tick_s);
         let braking_m_s2 = self.settings.braking_m_s2;
-        if !self.settings.enabled {
-            self.last = *wanted;
-            return *wanted;
-        }
         let (lower, upper) = (self.stretch.lower_m, self.stretch.upper_m);
         let outside = |position: f32| position > upper || position < lower;
         let speed = wanted.velocity_m_s;
         let stop_m = wanted.position_m + 0.5 * speed * speed.abs() / braking_m_s2;
-        self.at_edge = outside(wanted.position_m);
+        let enabled = self.settings.enabled;
+        self.at_edge = enabled && outside(wanted.position_m);
         // A reference that moves or is about to is on its way of one tick, or this far from it.
         let half_way_m = 0.5 * speed * tick_s;
         let away_m = (wanted.position_m - before.position_m - half_way_m).abs() - half_way_m.abs();
         let near_m = if self.follows { NEAR_M } else { CAUGHT_M };
-        self.follows = !self.at_edge && !outside(stop_m) && away_m < near_m;
+        self.follows = !enabled || (!self.at_edge && !outside(stop_m) && away_m < near_m);
         if self.follows {
             self.last = *wanted;
             return *wanted;
