@@ -267,11 +267,12 @@ impl<L: Law> Controller<L> {
                 let supervisor = &mut self.supervisor;
                 if arrival == Arrival::OutOfRange {
                     self.due = Due::Preparation;
-                    if supervisor.drives() && !frame.inputs.contains(DigitalInputs::ENABLE) {
+                    if supervisor.state().drives() && !frame.inputs.contains(DigitalInputs::ENABLE)
+                    {
                         supervisor.disable();
                     }
                 }
-                if !supervisor.drives() {
+                if !supervisor.state().drives() {
                     self.stop();
                 }
             }

@@ -94,9 +94,10 @@ impl<L: Law> Controller<L> {
     /// Prepares the estimates for the next readings.
     #[inline]
     pub(super) fn prepare(&mut self) {
-        let drives = self.supervisor.drives();
+        let state = self.supervisor.state();
+        let drives = state.drives();
         self.estimates.prepare(&mut self.command, drives);
-        self.references.prepare(self.supervisor.state());
+        self.references.prepare(state);
         self.observed.drove = drives;
         self.observed.torque_nm = self.command.torque_nm;
         self.observed.rounding_nm = self.command.rounding_nm;

@@ -173,11 +173,6 @@ impl Supervisor {
         self.fault
     }
 
-    /// Returns whether torque may be applied.
-    pub fn drives(&self) -> bool {
-        self.state.drives()
-    }
-
     /// Records how many times a lapse occurred, 0 for none. Returns whether this has just latched a
     /// fault; the caller then takes the torque off.
     #[inline]
@@ -293,7 +288,7 @@ mod tests {
             supervisor.tick(ON, false, true);
         }
         assert_eq!(supervisor.fault(), Some(Fault::ContactNotFound));
-        assert!(!supervisor.0.drives());
+        assert!(!supervisor.state().drives());
     }
 
     #[test]
