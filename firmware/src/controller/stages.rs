@@ -58,7 +58,10 @@ impl<L: Law> Controller<L> {
         let mut flags = StatusFlags::default();
         flags.set(StatusFlags::CONTACT, touches);
         flags.set(StatusFlags::SATURATED, command.saturated);
-        flags.set(StatusFlags::REFERENCE_DONE, self.references.is_done());
+        flags.set(
+            StatusFlags::REFERENCE_DONE,
+            self.references.generator.is_done(),
+        );
         flags.set(StatusFlags::AT_EDGE, target.at_edge);
         flags.set(StatusFlags::RECOVERING, target.recovering && drives);
         flags.set(StatusFlags::SLIP_NEGATIVE, slips);

@@ -47,7 +47,7 @@ pub struct References {
     pub asks_for_landing: bool,
     /// Whether the program waits for the edges: if it began before, it would have to catch up, and could overtake a slow belt.
     waits: bool,
-    generator: ReferenceGenerator,
+    pub(crate) generator: ReferenceGenerator,
 }
 
 impl References {
@@ -66,11 +66,6 @@ impl References {
             waits: false,
             generator,
         }
-    }
-
-    /// Returns whether the last segment has ended.
-    pub fn is_done(&self) -> bool {
-        self.generator.is_done()
     }
 
     /// Returns the target of a tick. `landing` is the posture in which a thrown tip is being returned to the belt.
@@ -108,7 +103,9 @@ impl References {
         let wanted = match phase.state {
             SupervisorState::Armed => self.generator.start(),
             // The reference waits for a tip that is being returned to the belt.
-            SupervisorState::LiftOff if recovering => self.generator.present(),
+            SupervisorState::LiftOff if recovering => {
+                TipReference::at_rest(self.generator.next.position_m)
+            }
             SupervisorState::Tracking if phase.starts_tracking || self.waits => {
                 self.generator.start()
             }

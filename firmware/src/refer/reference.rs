@@ -148,7 +148,7 @@ pub struct ReferenceGenerator {
     /// Ticks since the start of the segment.
     elapsed_ticks: u32,
     /// Reference at that time, once [prepared](Self::prepare).
-    next: TipReference,
+    pub(super) next: TipReference,
 }
 
 impl ReferenceGenerator {
@@ -177,11 +177,6 @@ impl ReferenceGenerator {
     /// Returns the start of the present segment, at rest: the position to hold before following.
     pub fn start(&self) -> TipReference {
         TipReference::at_rest(self.start_m)
-    }
-
-    /// Returns the prepared reference at rest: the position to hold while time stands still.
-    pub fn present(&self) -> TipReference {
-        TipReference::at_rest(self.next.position_m)
     }
 
     /// Returns the prepared reference, and advances time by one tick.
