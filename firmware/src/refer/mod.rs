@@ -130,30 +130,27 @@ impl References {
             edges_for_landing: recovering
                 && self
                     .governor
-                    .has_edges_for(self.posture, self.asked_p_ratio()),
+                    .has_edges_for(self.posture, self.landing_p_ratio),
             at_edge: drives && !recovering && self.governor.at_edge,
             recovering,
-        }
-    }
-
-    /// Returns the least p, as a fraction of Q22, that is asked for beyond the governor's own.
-    fn asked_p_ratio(&self) -> f32 {
-        if self.asks_for_landing {
-            self.landing_p_ratio
-        } else {
-            0.0
         }
     }
 
     /// Continues the search for the edges of the admissible stretch around the tip.
     #[inline(never)]
     pub fn search(&mut self, estimates: &Estimators) {
+        // The least p, as a fraction of Q22, that is asked for beyond the governor's own.
+        let asked_p_ratio = if self.asks_for_landing {
+            self.landing_p_ratio
+        } else {
+            0.0
+        };
         self.governor.search(
             &estimates.arm,
             self.posture,
             estimates.model.tip_m.x,
             &estimates.contact.friction,
-            self.asked_p_ratio(),
+            asked_p_ratio,
         );
     }
 
