@@ -1,21 +1,10 @@
 //! Classifies an arriving sensor frame and records its lapses.
 
-use painleve_shared::frame::SensorFrame;
+use painleve_shared::frame::{DigitalInputs, SensorFrame};
 
-use super::Controller;
+use super::{Controller, Due};
 use crate::law::Law;
 use crate::supervise::lapses::{BOARD_LAPSES, Lapse};
-
-/// Result of the checks of a frame.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Arrival {
-    /// Valid readings, this many ticks after the previous ones (1 when none were lost).
-    After(u32),
-    /// A repeated or old frame.
-    Stale,
-    /// A new frame with an impossible reading.
-    OutOfRange,
-}
 
 /// Record of the frames received.
 #[derive(Clone, Copy, Debug, Default)]
@@ -26,9 +15,10 @@ pub(super) struct ArrivalState {
 }
 
 impl<L: Law> Controller<L> {
-    /// Checks a frame before its readings are used, and records its lapses.
+    /// Checks a frame before its readings are used, and records its lapses. Returns by how many ticks valid readings follow
+    /// the previous ones (1 when none were lost); `None` for a repeated or old frame, and for an impossible reading.
     #[inline]
-    pub(super) fn arrive(&mut self, frame: &SensorFrame) -> Arrival {
+    pub(super) fn arrive(&mut self, frame: &SensorFrame) -> Option<u32> {
         let state = &mut self.arrivals;
         let last = state
             .last_sequence
@@ -44,14 +34,14 @@ impl<L: Law> Controller<L> {
         for lapse in Lapse::OF_FRAMES {
             self.supervisor.note(*lapse, 0);
         }
-        Arrival::After(1 + core::mem::take(&mut state.unread_ticks))
+        Some(1 + core::mem::take(&mut state.unread_ticks))
     }
 
     /// Handles a frame that is out of sequence, has readings out of range, or reports faults of the board. The answer to it
     /// takes the torque off if this latches a fault.
     #[cold]
     #[inline(never)]
-    fn irregular(&mut self, frame: &SensorFrame, ahead: u32) -> Arrival {
+    fn irregular(&mut self, frame: &SensorFrame, ahead: u32) -> Option<u32> {
         let (state, supervisor) = (&mut self.arrivals, &mut self.supervisor);
         let (encoders, forces) = self.estimates.can_read(frame);
         // One latch after all of them: a call for each would add to the bound on a tick.
@@ -67,21 +57,20 @@ impl<L: Law> Controller<L> {
         // More than half the counter's range ahead means behind.
         let stale = ahead == 0 || ahead > u32::MAX / 2;
         note(Lapse::StaleFrame, u32::from(stale));
-        let arrival = if stale {
-            Arrival::Stale
-        } else {
+        let mut elapsed_ticks = None;
+        if !stale {
             note(Lapse::LostFrame, ahead - 1);
             note(Lapse::EncoderOutOfRange, u32::from(!encoders));
             note(Lapse::ForceOutOfRange, u32::from(!forces));
             let ticks = ahead.saturating_add(state.unread_ticks);
             if encoders && forces {
                 state.unread_ticks = 0;
-                Arrival::After(ticks)
+                elapsed_ticks = Some(ticks);
             } else {
                 state.unread_ticks = ticks.min(u32::MAX / 2);
-                Arrival::OutOfRange
+                self.due = Due::Preparation;
             }
-        };
+        }
         if let Some(lapse) = first {
             supervisor.latch(lapse.fault());
         }
@@ -90,6 +79,10 @@ impl<L: Law> Controller<L> {
         if !stale || supervisor.fault().is_some() {
             state.last_sequence = Some(frame.sequence);
         }
-        arrival
+        let disables = !stale && !frame.inputs.contains(DigitalInputs::ENABLE);
+        if disables && elapsed_ticks.is_none() && supervisor.state().drives() {
+            supervisor.disable();
+        }
+        elapsed_ticks
     }
 }

@@ -19,10 +19,10 @@ mod stages;
 mod tests;
 
 use painleve_shared::counts::TorqueCounts;
-use painleve_shared::frame::{ActuatorFrame, DigitalInputs, SensorFrame, StatusFlags};
+use painleve_shared::frame::{ActuatorFrame, SensorFrame, StatusFlags};
 use painleve_shared::range::OutOfRange;
 
-use self::arrival::{Arrival, ArrivalState};
+use self::arrival::ArrivalState;
 use crate::configuration::Configuration;
 use crate::demand::TorqueDemand;
 use crate::estimate::belt::BeltEstimator;
@@ -261,21 +261,10 @@ impl<L: Law> Controller<L> {
             self.catch_up();
         }
         match self.arrive(frame) {
-            Arrival::After(elapsed_ticks) => self.follow(frame, elapsed_ticks, show),
+            Some(elapsed_ticks) => self.follow(frame, elapsed_ticks, show),
             // Without new readings, the last torque stays for a limited number of ticks.
-            arrival => {
-                let supervisor = &mut self.supervisor;
-                if arrival == Arrival::OutOfRange {
-                    self.due = Due::Preparation;
-                    if supervisor.state().drives() && !frame.inputs.contains(DigitalInputs::ENABLE)
-                    {
-                        supervisor.disable();
-                    }
-                }
-                if !supervisor.state().drives() {
-                    self.stop();
-                }
-            }
+            None if self.supervisor.state().drives() => {}
+            None => self.stop(),
         }
         self.last_answer.tick = frame.tick;
         self.last_answer.sequence = self.last_answer.sequence.wrapping_add(1);
