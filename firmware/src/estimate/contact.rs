@@ -48,22 +48,6 @@ settings! {
     }
 }
 
-/// Contact evidence from the encoders at one tick.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct EncoderReading {
-    /// Measured height of the tip above the belt, m.
-    pub gap_m: f32,
-    /// Largest error of the measured height, m.
-    pub gap_error_m: f32,
-    /// Whether the readings differ from the previous ones.
-    pub moved: bool,
-    /// Inner product of the tracking loops' innovations with the steady innovations that the loss
-    /// of the expected contact force causes, counts².
-    pub release: f32,
-    /// Squared length of those steady innovations, counts².
-    pub full_release: f32,
-}
-
 /// Weighs readings as evidence for contact or flight.
 #[derive(Clone, Copy, Debug)]
 pub struct ContactDetector {
@@ -95,14 +79,15 @@ impl ContactDetector {
         self.weigh((self.slope_per_n * above).within(CERTAIN))
     }
 
-    /// Updates the decision with one tick's encoder readings. Returns whether the tip touches.
-    pub fn update_from_encoders(&mut self, encoders: &EncoderReading) -> bool {
-        let gap =
-            (GAP_SLOPE * (1.0 - encoders.gap_m / encoders.gap_error_m)).limited(-CERTAIN, GAP_FOR);
-        let release = ((0.5 * encoders.full_release - encoders.release) / INNOVATION_VARIANCE)
-            .limited(-CERTAIN, 0.0);
+    /// Updates the decision with one tick's encoder readings: the measured height of the tip above the belt as a part of its
+    /// largest error; half of what the squared distance of the tracking loops' innovations from the steady ones without
+    /// the expected contact force exceeds that from none, counts²; and whether the readings differ from the previous
+    /// ones. Returns whether the tip touches.
+    pub fn update_from_encoders(&mut self, gap: f32, held_counts2: f32, moved: bool) -> bool {
+        let gap = (GAP_SLOPE * (1.0 - gap)).limited(-CERTAIN, GAP_FOR);
+        let release = (held_counts2 / INNOVATION_VARIANCE).limited(-CERTAIN, 0.0);
         // Unchanged readings add no evidence against contact.
-        let least = if encoders.moved { f32::MIN } else { 0.0 };
+        let least = if moved { f32::MIN } else { 0.0 };
         self.weigh((gap + release).at_least(least))
     }
 
@@ -140,13 +125,9 @@ mod tests {
         ContactDetector::new(&ContactSettings::default())
     }
 
-    fn gap(gap_m: f32) -> EncoderReading {
-        EncoderReading {
-            gap_m,
-            gap_error_m: 65e-6,
-            moved: true,
-            ..Default::default()
-        }
+    /// Updates with a gap, m, that changes.
+    fn update(detector: &mut ContactDetector, gap_m: f32) -> bool {
+        detector.update_from_encoders(gap_m / 65e-6, 0.0, true)
     }
 
     /// Returns the number of ticks until the decision is `contact`.
@@ -186,43 +167,36 @@ mod tests {
         let mut detector = detector();
         for tick in 0..1000 {
             // Quantisation alone.
-            detector.update_from_encoders(&gap(if tick % 7 < 3 { 49e-6 } else { -49e-6 }));
+            update(&mut detector, if tick % 7 < 3 { 49e-6 } else { -49e-6 });
         }
         assert!(detector.contact);
-        assert!(ticks_until(false, || detector.update_from_encoders(&gap(100e-6))) <= 3);
-        assert!(ticks_until(true, || detector.update_from_encoders(&gap(0.0))) <= 8);
+        assert!(ticks_until(false, || update(&mut detector, 100e-6)) <= 3);
+        assert!(ticks_until(true, || update(&mut detector, 0.0)) <= 8);
     }
 
     #[test]
     fn an_unchanged_reading_adds_no_evidence_against_contact() {
         let mut detector = detector();
         for _ in 0..20 {
-            detector.update_from_encoders(&gap(0.0));
+            update(&mut detector, 0.0);
         }
-        let stays = EncoderReading {
-            moved: false,
-            ..gap(80e-6)
-        };
         for _ in 0..100 {
-            assert!(detector.update_from_encoders(&stays));
+            assert!(detector.update_from_encoders(80.0 / 65.0, 0.0, false));
         }
-        assert!(ticks_until(false, || detector.update_from_encoders(&gap(80e-6))) <= 3);
+        assert!(ticks_until(false, || update(&mut detector, 80e-6)) <= 3);
     }
 
     #[test]
     fn a_missing_contact_force_is_flight_unless_it_is_too_small_to_detect() {
         // The full loss of force, and the fraction of it that shows.
         let ticks_until_flight = |full_release: f32, part: f32| {
-            let reading = |release| EncoderReading {
-                release,
-                full_release,
-                ..gap(0.0)
-            };
             let mut detector = detector();
+            let mut update =
+                |part| detector.update_from_encoders(0.0, full_release * (0.5 - part), true);
             for _ in 0..20 {
-                detector.update_from_encoders(&reading(0.0));
+                update(0.0);
             }
-            (1..100).find(|_| !detector.update_from_encoders(&reading(part * full_release)))
+            (1..100).find(|_| !update(part))
         };
         assert_eq!(ticks_until_flight(9.0, 1.0), Some(3));
         assert_eq!(ticks_until_flight(9.0, 0.4), None);

@@ -124,10 +124,7 @@ impl Estimators {
         );
         let touches = match self.detector.settings.evidence {
             Evidence::ForceCell => self.detector.update_from_force(force_n.y),
-            Evidence::Encoders => {
-                let encoders = self.encoder_reading(last);
-                self.detector.update_from_encoders(&encoders)
-            }
+            Evidence::Encoders => self.touches_by_encoders(last),
         };
         let contact = &mut self.contact;
         let touched = core::mem::replace(&mut contact.touches, touches);
