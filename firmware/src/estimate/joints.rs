@@ -12,7 +12,6 @@
 //!
 //! An encoder on the motor side of an elastic gear leads the link by the gear's twist under the torque.
 
-use nalgebra::Vector2;
 use painleve_shared::counts::{EncoderCounts, EncoderScale};
 use painleve_shared::{JointMotion, JointTorque, LinkMotion, Pose, Real, settings};
 
@@ -55,12 +54,12 @@ pub struct JointEstimator {
     scales: [EncoderScale; 2],
     /// One count of an encoder, rad.
     pub(super) rad_per_count: f32,
-    /// Innovation in counts that an acceleration of 1 rad/s² causes if it is not fed forward.
-    lag_counts_s2: f32,
+    /// Steady innovation in counts that an acceleration q̈' of 1 rad/s² causes if it is not fed forward: T²/(1 − z)².
+    pub(super) lag_counts_s2: f32,
     /// Largest count by which a joint can move in a tick.
     jump_counts: u32,
     tick_s: f32,
-    angle_gain: f32,
+    pub(super) angle_gain: f32,
     rate_gain_per_s: f32,
     /// The last readings; absent before the first, and until then all estimates are zero.
     readings: Option<[EncoderCounts; 2]>,
@@ -72,7 +71,7 @@ pub struct JointEstimator {
     pub(super) angles_rad: JointMotion<f32>,
     rates_rad_s: JointMotion<f32>,
     /// Measured less expected angles at the last tick, rad.
-    innovation_rad: JointMotion<f32>,
+    pub(super) innovation_rad: JointMotion<f32>,
     /// Whether the last readings differed from the previous ones.
     pub(super) moved: bool,
     /// Ticks predicted since the last readings.
@@ -210,22 +209,6 @@ impl JointEstimator {
         self.angles_rad = encoders_rad + self.correction_rad;
         self.rates_rad_s = JointMotion::zeros();
         self.innovation_rad = JointMotion::zeros();
-    }
-
-    /// Returns the measured minus the expected joint angles q' at the last tick, counts.
-    pub fn innovation_counts(&self) -> Vector2<f32> {
-        self.innovation_rad.vector() * (1.0 / self.rad_per_count)
-    }
-
-    /// Returns the steady innovation, counts, that an acceleration of q' (rad/s²) causes if it is
-    /// not fed forward: q̈' T²/(1 − z)².
-    pub fn lag_counts(&self, acceleration_rad_s2: &JointMotion<f32>) -> Vector2<f32> {
-        acceleration_rad_s2.vector() * self.lag_counts_s2
-    }
-
-    /// Returns the measured minus the estimated link angles after the last tick's correction, rad.
-    pub fn residual_rad(&self) -> LinkMotion<f32> {
-        self.innovation_rad.to_links() * (1.0 - self.angle_gain)
     }
 
     /// Returns the link angles θ = (θ1, θ2), rad; zero before the first readings.
