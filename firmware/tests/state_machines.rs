@@ -376,7 +376,11 @@ impl StateMachineTest for LapseTest {
 
     fn check_invariants(monitor: &LapseMonitor, model: &LapseModel) {
         for lapse in Lapse::ALL {
-            assert_eq!(monitor.total(*lapse), model.total(*lapse), "{lapse:?}");
+            assert_eq!(
+                monitor.totals().of(*lapse),
+                model.total(*lapse),
+                "{lapse:?}"
+            );
         }
     }
 }

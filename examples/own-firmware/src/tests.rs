@@ -75,7 +75,7 @@ fn enable_arms_lapses_stop_and_reset_then_a_new_enable_start_again() {
     // Ticks without a sample, up to the limit, change nothing; one more stops.
     bench.ticks(limits.missing_frames, 0, ENABLE);
     let lapses = bench.task.lapses().expect("configured");
-    assert_eq!(lapses.total(Lapse::MissingFrame), limits.missing_frames);
+    assert_eq!(lapses.totals().of(Lapse::MissingFrame), limits.missing_frames);
     assert_eq!(bench.ticks(60, 1, ENABLE), TRACKING);
     assert_eq!(
         bench.ticks(limits.missing_frames + 1, 0, ENABLE),

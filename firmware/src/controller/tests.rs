@@ -102,7 +102,7 @@ fn counters_wrap_without_a_fault() {
         answer = controller.tick(&frame(tick.wrapping_add(u32::MAX - 50)));
     }
     assert_eq!(answer.supervisor_state(), Some(SupervisorState::Tracking));
-    assert_eq!(controller.lapses().total(Lapse::LostFrame), 0);
+    assert_eq!(controller.lapses().totals().of(Lapse::LostFrame), 0);
 }
 
 /// A frame with one reading that its converter cannot give.
@@ -134,8 +134,8 @@ fn impossible_readings_keep_the_torque_and_too_many_are_a_fault() {
         for tick in (good + 1..).take(limit as usize) {
             controller.tick(&impossible(tick, lapse));
         }
-        assert_eq!(controller.lapses().total(lapse), 2 * limit);
-        assert_eq!(controller.lapses().total(Lapse::LostFrame), 0);
+        assert_eq!(controller.lapses().totals().of(lapse), 2 * limit);
+        assert_eq!(controller.lapses().totals().of(Lapse::LostFrame), 0);
         let one_more = impossible(good + limit + 1, lapse);
         assert_fault(&mut controller, &one_more, lapse.fault());
     }
@@ -221,7 +221,7 @@ fn lost_frames_are_counted_and_too_many_are_a_fault() {
     let mut controller = tracking();
     let answer = controller.tick(&frame(22));
     assert_eq!(answer.latched_fault(), None);
-    assert_eq!(controller.lapses().total(Lapse::LostFrame), 2);
+    assert_eq!(controller.lapses().totals().of(Lapse::LostFrame), 2);
     assert_fault(&mut controller, &frame(30), Fault::LostFrames);
 }
 
@@ -233,7 +233,7 @@ fn a_stale_frame_keeps_the_torque_and_many_are_a_fault() {
         let answer = controller.tick(&frame(20));
         assert_eq!(answer.torques, before.torques);
     }
-    assert_eq!(controller.lapses().total(Lapse::StaleFrame), 5);
+    assert_eq!(controller.lapses().totals().of(Lapse::StaleFrame), 5);
     assert_fault(&mut controller, &frame(20), Fault::StaleFrame);
 }
 

@@ -255,7 +255,11 @@ mod tests {
         open_loop.tick(&frame(0, 100, DigitalInputs::ENABLE));
         open_loop.tick(&frame(1, u32::MAX, DigitalInputs::ENABLE));
         assert_eq!(
-            open_loop.supervisor.lapses.total(Lapse::EncoderOutOfRange),
+            open_loop
+                .supervisor
+                .lapses
+                .totals()
+                .of(Lapse::EncoderOutOfRange),
             1
         );
     }

@@ -61,14 +61,9 @@ impl LapseMonitor {
         count.owed > tolerated
     }
 
-    /// Returns how often `lapse` has occurred; wraps.
-    pub fn total(&self, lapse: Lapse) -> u32 {
-        self.counts[lapse as usize].total
-    }
-
-    /// Returns how often each lapse has occurred.
+    /// Returns how often each lapse has occurred; wraps.
     pub fn totals(&self) -> LapseCounts {
-        LapseCounts::from_fn(|lapse| self.total(lapse))
+        LapseCounts::from_fn(|lapse| self.counts[lapse as usize].total)
     }
 }
 
@@ -91,10 +86,10 @@ mod tests {
             assert!(!monitor.note(lapse, limit));
             for other in Lapse::ALL.iter().copied().filter(|other| *other != lapse) {
                 assert!(!monitor.note(other, 1));
-                assert_eq!(monitor.total(other), 1);
+                assert_eq!(monitor.totals().of(other), 1);
             }
             assert!(monitor.note(lapse, 1), "{lapse:?}");
-            assert_eq!(monitor.total(lapse), 2 * limit + 1);
+            assert_eq!(monitor.totals().of(lapse), 2 * limit + 1);
         }
     }
 
@@ -135,6 +130,6 @@ mod tests {
         let mut monitor = LapseMonitor::default();
         monitor.counts[Lapse::MissingFrame as usize].total = u32::MAX;
         assert!(!monitor.note(Lapse::MissingFrame, 1));
-        assert_eq!(monitor.total(Lapse::MissingFrame), 0);
+        assert_eq!(monitor.totals().of(Lapse::MissingFrame), 0);
     }
 }

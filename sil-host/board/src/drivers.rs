@@ -178,8 +178,8 @@ impl ConnectedBoard for Drivers {
 
     fn remark(&self) -> Option<String> {
         let flipped = self.bit_errors();
-        let lapses = self.controller.lapses();
-        let lost = lapses.total(Lapse::EncoderOutOfRange) + lapses.total(Lapse::ForceOutOfRange);
+        let lapses = self.controller.lapses().totals();
+        let lost = lapses.of(Lapse::EncoderOutOfRange) + lapses.of(Lapse::ForceOutOfRange);
         (flipped > 0).then(|| {
             format!(
                 "sensor lines: {flipped} bits flipped, {lost} of {} ticks without a reading",

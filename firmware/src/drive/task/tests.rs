@@ -104,7 +104,7 @@ fn missing_frames_stop_a_drive_with_its_own_clock() {
     }
     let mut task = tracking(FrameSource::Lockstep);
     assert!((0..100).all(|_| task.tick().is_none()));
-    assert_eq!(task.lapses().unwrap().total(Lapse::MissingFrame), 0);
+    assert_eq!(task.lapses().unwrap().totals().of(Lapse::MissingFrame), 0);
 }
 
 fn missing_frames_stop(source: FrameSource) {
@@ -147,7 +147,7 @@ fn the_answer_of_a_late_tick_is_reported_with_the_next_one() {
     let mut task = tracking(FrameSource::Lockstep);
     let overruns = |task: &ControlTask<Mock>| {
         let counts = task.lapses().unwrap();
-        counts.total(Lapse::Overrun)
+        counts.totals().of(Lapse::Overrun)
     };
     task.drive.frame = Some(frame(20));
     task.answer();
