@@ -15,8 +15,6 @@ pub struct ContactEstimate {
     pub lands: bool,
     /// Whether the tip touched at the previous tick but does not now.
     pub leaves: bool,
-    /// Whether flight is certain.
-    pub in_flight: bool,
     /// Measured contact force (f_t, f_n), N.
     pub force_n: Vector2<f32>,
     /// Estimated friction.

@@ -130,7 +130,6 @@ impl Estimators {
         let touched = core::mem::replace(&mut contact.touches, touches);
         contact.lands = touches && !touched;
         contact.leaves = touched && !touches;
-        contact.in_flight = self.detector.is_in_flight();
         contact.force_n = force_n;
         self.correct_friction(last.reference_velocity_m_s);
         followed

@@ -79,7 +79,7 @@ impl References {
         let (model, contact) = (&estimates.model, &estimates.contact);
         // The descent continues, and presses the tip gently, until contact is certain. The law's
         // whole force while in doubt would be evidence that comes and goes with the law.
-        let descends = contact.in_flight || landing.is_some();
+        let descends = estimates.detector.is_in_flight() || landing.is_some();
         let drives = phase.state.drives();
         let recovering = drives && phase.recovers && !contact.touches && descends;
         self.asks_for_landing = recovering || landing.is_some();
