@@ -181,9 +181,7 @@ impl<L: Law> Controller<L> {
     /// Answers one sensor frame and updates the state for the next one.
     #[inline]
     pub fn tick(&mut self, frame: &SensorFrame) -> ActuatorFrame {
-        self.answer(frame);
-        self.update();
-        self.last_answer
+        self.tick_and_show(frame, |_, _, _| {})
     }
 
     /// Answers one sensor frame, updates the state for the next one, and shows what the answer followed from, for logs and
