@@ -177,17 +177,6 @@ impl Supervisor {
     /// fault; the caller then takes the torque off.
     #[inline]
     pub fn note(&mut self, lapse: Lapse, times: u32) -> bool {
-        // Nearly all calls record no lapse: return early.
-        if times == 0 {
-            self.lapses.note(lapse, 0)
-        } else {
-            self.note_bad(lapse, times)
-        }
-    }
-
-    #[cold]
-    #[inline(never)]
-    fn note_bad(&mut self, lapse: Lapse, times: u32) -> bool {
         let latches = self.lapses.note(lapse, times) && self.fault.is_none();
         if latches {
             self.latch(lapse.fault());

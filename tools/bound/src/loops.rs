@@ -104,7 +104,7 @@ impl Limits {
                 "the longer set-up time of the two buses, which are started together",
             ),
             declare(
-                "OpenLoop::note_lapses",
+                "OpenLoop::tick",
                 Limit::Times(BOARD_LAPSES.len() as u32),
                 "lapses that a board reports",
             ),
