@@ -12,7 +12,6 @@
 pub mod belt;
 pub mod calibration;
 pub mod contact;
-mod contact_estimate;
 pub mod disturbance;
 pub mod encoder_correction;
 pub mod friction;
@@ -30,15 +29,34 @@ use painleve_shared::{Arm, JointTorque, Pose, Slip};
 use self::belt::{BOUND_ERROR_M_S, BeltEstimator};
 use self::calibration::LengthCalibrator;
 use self::contact::{ContactDetector, Evidence};
-pub use self::contact_estimate::ContactEstimate;
 use self::disturbance::DisturbanceEstimator;
-use self::friction::FrictionEstimator;
+use self::friction::{FrictionEstimate, FrictionEstimator};
 use self::joint_friction::JointFriction;
 use self::joints::{JointEstimator, Restart};
 use self::model::Model;
-use self::response::ResponseEstimator;
+use self::response::{ContactResponse, ResponseEstimator};
 use crate::last_command::LastCommand;
 use crate::schedule::Turn;
+
+/// The contact estimate at a tick, for the posture predicted for it: contact and force from its readings, and in contact
+/// friction and p.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct ContactEstimate {
+    /// Whether the tip touches.
+    pub touches: bool,
+    /// Whether the tip touches now but did not at the previous tick.
+    pub lands: bool,
+    /// Whether the tip touched at the previous tick but does not now.
+    pub leaves: bool,
+    /// Measured contact force (f_t, f_n), N.
+    pub force_n: Vector2<f32>,
+    /// Estimated friction.
+    pub friction: FrictionEstimate,
+    /// p with that friction, 1/kg.
+    pub p_per_kg: f32,
+    /// What the contact's response to torque allows, from the readings before.
+    pub response: ContactResponse,
+}
 
 /// What the update after a tick needs of it besides the estimates.
 #[derive(Clone, Copy, Debug, Default)]
