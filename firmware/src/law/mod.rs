@@ -8,15 +8,18 @@
 
 pub mod hybrid;
 pub mod pid;
-mod signals;
 
 use core::fmt::Debug;
 
+use nalgebra::Vector2;
 use painleve_shared::settings::SettingValue;
+use painleve_shared::{Arm, JointTorque, Posture};
 
-pub use self::signals::{LawInput, LawOutput};
-use hybrid::HybridSettings;
-use pid::PidSettings;
+use self::hybrid::HybridSettings;
+use self::pid::PidSettings;
+use crate::estimate::ContactEstimate;
+use crate::estimate::model::Model;
+use crate::refer::reference::TipReference;
 
 /// A control law: constant settings that compute torques from the inputs of a tick and a state of
 /// their own.
@@ -90,6 +93,36 @@ pub trait Law: Clone + Debug + Default + SettingValue {
     /// Computes the torques for one tick. Takes bounded time, does not allocate and does not panic;
     /// a torque or contact force that is not finite latches a fault.
     fn tick(&self, state: &mut Self::State, input: &LawInput<'_>) -> LawOutput;
+}
+
+/// Inputs of a law at one tick.
+#[derive(Clone, Copy, Debug)]
+pub struct LawInput<'a> {
+    /// The arm's model.
+    pub arm: &'a Arm<f32>,
+    /// The model's terms at the estimated state.
+    pub model: &'a Model,
+    /// Posture in which the drive was armed or the tip landed.
+    pub posture: Posture,
+    /// The contact's estimate.
+    pub contact: &'a ContactEstimate,
+    /// Whether the torque of the previous tick was limited.
+    pub saturated: bool,
+    /// Reference of the tip.
+    pub reference: TipReference,
+    /// Largest torque on either joint, N·m.
+    pub torque_limit_nm: f32,
+    /// Control period, s.
+    pub tick_s: f32,
+}
+
+/// A law's answer; the default is no torque.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct LawOutput {
+    /// Desired joint torques, N·m, before limits.
+    pub torque_nm: JointTorque<f32>,
+    /// Contact force (f_t, f_n) that the law expects with these torques, N.
+    pub contact_force_n: Vector2<f32>,
 }
 
 /// Declares a set of laws: an enum of their settings that is itself a [`Law`](crate::law::Law), and
