@@ -109,15 +109,13 @@ impl RecoverySettings {
             flight.landing_m = model.tip_m.x;
         }
         let mut away = flight.landing_m - model.tip_m.x;
-        flight.lands = if let Some(Stretch { lower_m, upper_m }) = stretch {
+        flight.lands = stretch.is_some_and(|Stretch { lower_m, upper_m }| {
             let place_m = flight.landing_m.limited(lower_m, upper_m);
             flight.landing_m += (place_m - flight.landing_m).within(TRAVEL_M_S * tick_s);
             let tip_m = model.tip_m.x;
             away = place_m - tip_m;
             away.abs() < NEAR_M || (flight.lands && tip_m > lower_m && tip_m < upper_m)
-        } else {
-            false
-        };
+        });
         if rests {
             let onwards_m = YIELDING_PER_S * tick_s * away;
             flight.beyond_m = (flight.beyond_m + onwards_m).within(FARTHEST_M);
