@@ -13,9 +13,8 @@ impl Estimators {
     pub(super) fn gap_m(&self) -> f32 {
         // Measured minus estimated angles after the correction.
         let residual = self.joints.innovation_rad.to_links() * (1.0 - self.joints.angle_gain);
-        let model = &self.model;
-        let jacobian = &model.jacobian;
-        model.gap_m + jacobian.m21 * residual.first() + jacobian.m22 * residual.second()
+        let jacobian = &self.model.jacobian;
+        self.model.gap_m + jacobian.m21 * residual.first() + jacobian.m22 * residual.second()
     }
 
     /// Decides about contact from the encoders: returns whether the tip touches. The belt is assumed at the lowest tip

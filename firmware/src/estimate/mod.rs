@@ -274,10 +274,8 @@ impl Estimators {
         self.joints.expect_pose(&pose);
         self.model = Model::in_pose(&self.arm, &pose, theta, theta_dot, &disturbance_nm);
         let (model, contact) = (&self.model, &mut self.contact);
-        let p_per_kg = model.p_per_kg(&contact.friction);
-        let p_ratio = p_per_kg / model.q22_per_kg;
-        let response = self.response.response(p_per_kg, p_ratio);
-        contact.p_per_kg = p_per_kg;
-        contact.response = response;
+        contact.p_per_kg = model.p_per_kg(&contact.friction);
+        let p_ratio = contact.p_per_kg / model.q22_per_kg;
+        contact.response = self.response.response(contact.p_per_kg, p_ratio);
     }
 }

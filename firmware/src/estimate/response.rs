@@ -206,11 +206,10 @@ impl ResponseEstimator {
             self.touched_s = self.touched_s.at_most(SETTLING_S - skipped_s);
         }
         let excitation_n = withheld_n - self.withheld_n + self.acting_probe_n;
-        let expected_n = excitation_n - self.excitation_n;
+        let e0 = excitation_n - self.excitation_n;
         self.withheld_n = withheld_n;
         self.excitation_n = excitation_n;
         let [e1, e2, e3, _] = self.expected_n;
-        let e0 = expected_n;
         self.expected_n = [e0, e1, e2, e3];
         let change_n = normal_force_n - self.force_n;
         let change_of_change_n = change_n - self.change_n;
