@@ -181,17 +181,7 @@ impl<L: Law> Controller<L> {
     /// Answers one sensor frame and updates the state for the next one.
     #[inline]
     pub fn tick(&mut self, frame: &SensorFrame) -> ActuatorFrame {
-        self.tick_and_show(frame, |_, _, _| {})
-    }
-
-    /// Answers one sensor frame, updates the state for the next one, and shows what the answer followed from, for logs and
-    /// displays; of a tick without new readings, nothing.
-    pub fn tick_and_show(
-        &mut self,
-        frame: &SensorFrame,
-        show: impl FnOnce(&Estimators, &Target, &LastCommand),
-    ) -> ActuatorFrame {
-        self.answer_and_show(frame, show);
+        self.answer(frame);
         self.update();
         self.last_answer
     }
@@ -249,8 +239,10 @@ impl<L: Law> Controller<L> {
         (&mut self.supervisor, &mut self.last_answer)
     }
 
+    /// [Answers](Self::answer), and shows what the answer followed from, for logs and displays; of a tick without new
+    /// readings, nothing.
     #[inline]
-    fn answer_and_show(
+    pub fn answer_and_show(
         &mut self,
         frame: &SensorFrame,
         show: impl FnOnce(&Estimators, &Target, &LastCommand),

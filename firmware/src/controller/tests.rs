@@ -71,9 +71,10 @@ fn what_is_learnt_does_not_depend_on_the_numbers_of_the_ticks() {
                 tick: number(sequence),
                 ..frame(sequence)
             };
-            controller.tick_and_show(&frame, |estimates, target, command| {
+            controller.answer_and_show(&frame, |estimates, target, command| {
                 shown = Some((target.stretch, estimates.contact.friction, *command));
             });
+            controller.update();
         }
         shown.unwrap()
     };

@@ -54,9 +54,11 @@ pub struct Telemetry {
 impl Telemetry {
     /// Runs a tick of the controller, and writes what it shows.
     pub fn tick(&mut self, controller: &mut Controller, frame: &SensorFrame) -> ActuatorFrame {
-        let answer = controller.tick_and_show(frame, |estimates, target, command| {
+        controller.answer_and_show(frame, |estimates, target, command| {
             self.record(estimates, target, command);
         });
+        controller.update();
+        let answer = *controller.last_answer();
         // A tick without new readings shows nothing, but may take the torque off.
         if answer.torques.iter().all(|torque| torque.0 == 0) {
             self.torque_nm = JointTorque::zeros();
