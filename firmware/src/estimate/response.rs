@@ -221,8 +221,12 @@ impl ResponseEstimator {
             return;
         }
         if self.gain < 1.0 {
-            // As much as there is to find out.
-            self.draw_probe(self.width.at_most(1.0) * self.settings.probe_n);
+            // As much as there is to find out, from a shift register of 16 bits with the longest period.
+            let amplitude_n = self.width.at_most(1.0) * self.settings.probe_n;
+            let feedback = if self.random & 1 == 1 { 0xb400 } else { 0 };
+            self.random = (self.random >> 1) ^ feedback;
+            let sign = if self.random & 1 == 1 { 1.0 } else { -1.0 };
+            self.allowed.probe_n = sign * amplitude_n;
         }
         let [first, second] = &mut self.sums;
         first.add(change_n, [e0, e1, e2]);
@@ -272,16 +276,6 @@ impl ResponseEstimator {
             // What the contact is stays known; the law's damping begins anew from the force after the pause.
             self.allowed.give = 0.0;
         }
-    }
-
-    /// Draws the next probe, ±`amplitude_n` (N), from a shift register of 16 bits with the longest
-    /// period.
-    #[inline]
-    fn draw_probe(&mut self, amplitude_n: f32) {
-        let feedback = if self.random & 1 == 1 { 0xb400 } else { 0 };
-        self.random = (self.random >> 1) ^ feedback;
-        let sign = if self.random & 1 == 1 { 1.0 } else { -1.0 };
-        self.allowed.probe_n = sign * amplitude_n;
     }
 }
 
