@@ -109,8 +109,8 @@ impl Estimators {
         (self.joints.can_read(frame.joints), forces)
     }
 
-    /// Corrects the predicted state of the arm with a frame's readings, `elapsed_ticks` after the previous ones, and
-    /// decides about contact.
+    /// Corrects the predicted state of the arm with a frame's readings, `elapsed_ticks` after the previous ones, decides
+    /// about contact, and corrects friction, and p with it, of a tip that touches.
     ///
     /// # Errors
     /// [`Restart`] if the estimate of the joints has started from these readings, at rest.
@@ -152,28 +152,21 @@ impl Estimators {
         contact.lands = touches && !touched;
         contact.leaves = touched && !touches;
         contact.force_n = force_n;
-        self.correct_friction(last.reference_velocity_m_s);
+        if touches {
+            if self.is_in_range() {
+                let tip_velocity_m_s = self.model.tip_velocity_m_s.x;
+                let is_dragged = |slip: Slip| {
+                    let lag_m_s = last.reference_velocity_m_s - tip_velocity_m_s;
+                    let falls_behind = slip.sign::<f32>() * lag_m_s > 2.0 * BOUND_ERROR_M_S;
+                    falls_behind && self.belt.may_stick(tip_velocity_m_s)
+                };
+                let contact = &mut self.contact;
+                self.friction_filter
+                    .correct(&mut contact.friction, &contact.force_n, is_dragged);
+            }
+            self.contact.p_per_kg = self.model.p_per_kg(&self.contact.friction);
+        }
         followed
-    }
-
-    /// Corrects friction, and p with it, of a tip that touches and follows a reference with this velocity.
-    #[inline(always)]
-    fn correct_friction(&mut self, reference_velocity_m_s: f32) {
-        if !self.contact.touches {
-            return;
-        }
-        if self.is_in_range() {
-            let tip_velocity_m_s = self.model.tip_velocity_m_s.x;
-            let is_dragged = |slip: Slip| {
-                let lag_m_s = reference_velocity_m_s - tip_velocity_m_s;
-                let falls_behind = slip.sign::<f32>() * lag_m_s > 2.0 * BOUND_ERROR_M_S;
-                falls_behind && self.belt.may_stick(tip_velocity_m_s)
-            };
-            let contact = &mut self.contact;
-            self.friction_filter
-                .correct(&mut contact.friction, &contact.force_n, is_dragged);
-        }
-        self.contact.p_per_kg = self.model.p_per_kg(&self.contact.friction);
     }
 
     /// Returns whether the force cell is not at the end of its range, where it reads less than the actual force.
