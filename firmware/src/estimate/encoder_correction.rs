@@ -5,7 +5,7 @@
 //! readings then add a number. They differ from the prediction by a fraction of a milliradian, which changes a correction
 //! of 10 mrad by 10⁻⁵ rad at most.
 
-use painleve_shared::{JointMotion, LinkMotion, Pose, settings};
+use painleve_shared::{JointMotion, Pose, settings};
 
 settings! {
     /// What is added to the angle q of each joint's encoder:
@@ -42,26 +42,14 @@ impl EncoderCorrection {
             at(1, pose.sine_elbow(), pose.cosine_elbow()),
         )
     }
-
-    /// Returns the link angles, rad, that readings of the encoders (rad) show without a prediction.
-    pub fn links_rad(&self, encoders_rad: [f64; 2]) -> LinkMotion<f64> {
-        let encoders = JointMotion::from_array(encoders_rad.map(|angle| angle as f32));
-        // As the tracking loops start, and once more: a correction of 10 mrad changes by a thirtieth of the angle's error at most.
-        let mut added_rad = JointMotion::from_array(self.zero_rad);
-        for _ in 0..2 {
-            added_rad = self.in_pose(&Pose::new(&(encoders + added_rad).to_links()));
-        }
-        let [one, two] = added_rad.to_array().map(f64::from);
-        JointMotion::new(encoders_rad[0] + one, encoders_rad[1] + two).to_links()
-    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::estimate::joints::{JointEstimator, JointEstimatorSettings};
-    use painleve_shared::JointTorque;
     use painleve_shared::counts::EncoderScale;
+    use painleve_shared::{JointTorque, LinkMotion};
     use proptest::prelude::*;
 
     fn pair(limit: f32) -> impl Strategy<Value = [f32; 2]> {
@@ -87,10 +75,6 @@ mod tests {
                     + second_sine_rad[joint] * twice.sin() + second_cosine_rad[joint] * twice.cos();
                 prop_assert!((found[joint] - expected).abs() < 1e-6, "{} {}", found[joint], expected);
             }
-            let readings_rad = [first - found[0], elbow - found[1]].map(f64::from);
-            let links_rad = encoders.links_rad(readings_rad);
-            prop_assert!((links_rad.to_joints().first() - f64::from(first)).abs() < 2e-4);
-            prop_assert!((links_rad.to_joints().second() - f64::from(elbow)).abs() < 2e-4);
             // The loops start near these joints: the harmonics are 0.042 at most, and change by 0.057 of the angle's error.
             let scale = EncoderScale { bits: 24, ..Default::default() };
             let settings = JointEstimatorSettings { encoders, ..Default::default() };

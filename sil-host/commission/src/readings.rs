@@ -2,6 +2,7 @@
 
 use nalgebra::Vector2;
 use painleve_firmware::estimate::encoder_correction::EncoderCorrection;
+use painleve_plant::converters::encoder::links_rad;
 use painleve_shared::counts::{EncoderCounts, EncoderScale, ForceCounts, TorqueCounts};
 use painleve_shared::{JointTorque, LinkMotion};
 
@@ -170,7 +171,7 @@ impl<'a, R: Rig> Session<'a, R> {
             angles[joint] =
                 f64::from(scale.counts_from_zero(forward)) * scale.rad_per_count::<f64>();
         }
-        Some(self.correction.links_rad(angles))
+        Some(links_rad(&self.correction, angles))
     }
 
     /// Returns raw forces minus the tare, N, as (f_t, f_n) in the cell's directions.

@@ -1,5 +1,6 @@
 //! A tick of a real arm in SI units: converter counts through the controller's own scalings and arm model.
 
+use painleve_plant::converters::encoder::links_rad;
 use painleve_plant::sample::{Sample, reference_tip_t_m};
 use painleve_plant::{Configuration, ContactMode, Snapshot};
 use painleve_shared::frame::{ActuatorFrame, SensorFrame, StatusFlags};
@@ -47,7 +48,7 @@ impl Measured {
             f64::from(counts) * scale.rad_per_count::<f64>()
         });
         let estimator = &self.configuration.settings.estimator;
-        let theta = estimator.encoders.links_rad(encoders_rad);
+        let theta = links_rad(&estimator.encoders, encoders_rad);
         let pose = Pose::new(&theta);
         let tip_m = self.arm.tip_m(&pose);
         let force_n = |counts| f64::from(converters.force.value(counts));

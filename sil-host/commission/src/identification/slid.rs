@@ -2,6 +2,7 @@
 
 use nalgebra::Vector2;
 use painleve_identify::{Reading, Refusal};
+use painleve_plant::converters::encoder::links_rad;
 use painleve_plant::scenario::Scenario;
 use painleve_shared::Pose;
 use painleve_shared::counts::{EncoderScale, TorqueCounts};
@@ -120,7 +121,7 @@ fn tip_m(scenario: &Scenario, encoders_rad: [f64; 2]) -> Vector2<f64> {
         None => scenario.arm.link_length_m,
     };
     let encoders = &scenario.controller.estimator.encoders;
-    let Pose { sine, cosine } = Pose::new(&encoders.links_rad(encoders_rad));
+    let Pose { sine, cosine } = Pose::new(&links_rad(encoders, encoders_rad));
     Vector2::new(
         length_1 * sine.x + length_2 * sine.y,
         -length_1 * cosine.x - length_2 * cosine.y,

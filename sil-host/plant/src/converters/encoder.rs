@@ -5,8 +5,9 @@
 
 use core::f64::consts::PI;
 
+use painleve_firmware::estimate::encoder_correction::EncoderCorrection;
 use painleve_shared::counts::{EncoderCounts, EncoderScale};
-use painleve_shared::{LinkMotion, OutOfRange, check_setting, settings};
+use painleve_shared::{JointMotion, LinkMotion, OutOfRange, Pose, check_setting, settings};
 
 use super::fault::{ChannelFaults, FaultyChannel};
 use super::noise::{Channel, Noise};
@@ -144,6 +145,18 @@ impl Encoders {
     }
 }
 
+/// Returns the link angles, rad, that readings of encoders with these known errors (rad) show without a prediction.
+pub fn links_rad(errors: &EncoderCorrection, encoders_rad: [f64; 2]) -> LinkMotion<f64> {
+    let encoders = JointMotion::from_array(encoders_rad.map(|angle| angle as f32));
+    // As the tracking loops start, and once more: a correction of 10 mrad changes by a thirtieth of the angle's error at most.
+    let mut added_rad = JointMotion::from_array(errors.zero_rad);
+    for _ in 0..2 {
+        added_rad = errors.in_pose(&Pose::new(&(encoders + added_rad).to_links()));
+    }
+    let [one, two] = added_rad.to_array().map(f64::from);
+    JointMotion::new(encoders_rad[0] + one, encoders_rad[1] + two).to_links()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -153,7 +166,27 @@ mod tests {
         Encoders::new(settings, &ChannelFaults::default(), 1e-3, 1, theta_rad)
     }
 
+    fn pair(limit: f32) -> impl Strategy<Value = [f32; 2]> {
+        [-limit..limit, -limit..limit]
+    }
+
     proptest! {
+        #[test]
+        fn readings_with_known_errors_show_the_links(
+            zero_rad in pair(0.1), sine_rad in pair(0.02), cosine_rad in pair(0.02),
+            second_sine_rad in pair(0.01), second_cosine_rad in pair(0.01),
+            first in -1.5_f32..1.5, elbow in -3.0_f32..3.0,
+        ) {
+            let errors = EncoderCorrection {
+                zero_rad, sine_rad, cosine_rad, second_sine_rad, second_cosine_rad,
+            };
+            let added = errors.in_pose(&Pose::new(&LinkMotion::new(first, first + elbow)));
+            let added = added.to_array();
+            let found = links_rad(&errors, [first - added[0], elbow - added[1]].map(f64::from));
+            prop_assert!((found.to_joints().first() - f64::from(first)).abs() < 2e-4);
+            prop_assert!((found.to_joints().second() - f64::from(elbow)).abs() < 2e-4);
+        }
+
         #[test]
         fn errors_are_a_constant_and_sines_of_the_joint_angle_once_and_twice_around(
             mounting in -0.1_f64..0.1, eccentricity in 0.0_f64..0.01, phase in -3.0_f64..3.0,
