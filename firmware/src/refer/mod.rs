@@ -101,16 +101,14 @@ impl References {
             self.generator.start_from(tip_t_m);
         }
         let wanted = match phase.state {
+            SupervisorState::Idle | SupervisorState::Fault => TipReference::at_rest(tip_t_m),
             SupervisorState::Armed => self.generator.start(),
             // The reference waits for a tip that is being returned to the belt.
             SupervisorState::LiftOff if recovering => {
                 TipReference::at_rest(self.generator.next.position_m)
             }
-            SupervisorState::Tracking if phase.starts_tracking || self.waits => {
-                self.generator.start()
-            }
+            _ if phase.starts_tracking || self.waits => self.generator.start(),
             SupervisorState::Tracking | SupervisorState::LiftOff => self.generator.next_tick(),
-            SupervisorState::Idle | SupervisorState::Fault => TipReference::at_rest(tip_t_m),
         };
         if starts || phase.starts_tracking {
             self.governor.restart(tip_t_m);
@@ -158,7 +156,9 @@ impl References {
     #[inline]
     pub fn prepare(&mut self, drive: SupervisorState) {
         self.waits = !(self.generator.has_begun() || self.governor.knows_edges());
-        if matches!(drive, SupervisorState::Tracking | SupervisorState::LiftOff) {
+        let follows = matches!(drive, SupervisorState::Tracking | SupervisorState::LiftOff);
+        // A segment without duration would end, and show a program that has begun.
+        if follows && !self.waits {
             self.generator.prepare();
         }
     }
