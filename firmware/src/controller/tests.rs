@@ -1,12 +1,13 @@
 //! Tests of the tick's handling of frames, faults, limits and counters.
 
+mod program;
+
 use super::*;
 use crate::configuration::ControllerSettings;
 use crate::estimate::contact::Evidence;
 use crate::refer::governor::Stretch;
 use crate::refer::reference::{Program, Segment};
 use crate::supervise::lapses::{Lapse, LapseLimits};
-use crate::supervise::supervisor::OnLiftOff;
 use crate::test_readings::pressing as frame;
 use painleve_shared::counts::{EncoderCounts, ForceCounts};
 use painleve_shared::frame::DigitalInputs;
@@ -422,46 +423,4 @@ fn a_force_beyond_all_measure_latches_a_fault_and_leaves_the_estimates() {
     controller.tick(&frame(2));
     let turned = controller.estimates.model.theta_rad - before;
     assert!(turned.amax() < 1e-3, "{turned:?}");
-}
-
-/// Returns the tick at which the program begins, while contact is lost for some ticks before the edges are known.
-fn begins_at(on_lift_off: OnLiftOff, segments: &[Segment], lost_ticks: u32) -> Option<u32> {
-    let mut configuration = <Configuration>::default();
-    configuration.settings.supervisor.on_lift_off = on_lift_off;
-    configuration.settings.reference = Program {
-        segments: segments.iter().copied().collect(),
-    };
-    let mut controller = Controller::new(&configuration).unwrap();
-    (0..600).find(|tick| {
-        let mut frame = frame(*tick);
-        if (20..20 + lost_ticks).contains(tick) {
-            frame.normal_force = ForceCounts(0);
-            frame.tangential_force = ForceCounts(0);
-        }
-        controller.tick(&frame);
-        controller.references.generator.has_begun()
-    })
-}
-
-#[test]
-fn a_program_begins_once_the_edges_are_known() {
-    let moves = Segment::MinimumJerk {
-        target_m: 0.1,
-        duration_s: 3.0,
-    };
-    let jumps = Segment::Step {
-        target_m: -0.05,
-        duration_s: 0.0,
-    };
-    for on_lift_off in [OnLiftOff::Recover, OnLiftOff::Continue] {
-        for segments in [&[moves][..], &[jumps, moves]] {
-            for lost_ticks in [0, 10] {
-                let begins_at = begins_at(on_lift_off, segments, lost_ticks);
-                assert!(
-                    begins_at.is_some_and(|tick| tick > 100),
-                    "{on_lift_off:?} {segments:?} {lost_ticks}: {begins_at:?}"
-                );
-            }
-        }
-    }
 }

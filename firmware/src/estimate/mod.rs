@@ -37,9 +37,9 @@ use self::response::{ContactResponse, ResponseEstimator};
 use crate::last_command::LastCommand;
 use crate::schedule::Turn;
 
-/// Uncertainty of the gap beyond the encoders' resolution, m; averaging does not remove all of it, because successive roundings
-/// are not independent.
-const GAP_UNCERTAINTY_M: f32 = 20e-6;
+/// Smallest distance that matters, m. Averages of the encoders' readings do not resolve less, because successive roundings are not
+/// independent; a reference that near has been caught up with.
+pub const RESOLVED_M: f32 = 2e-5;
 
 /// The contact estimate at a tick, for the posture predicted for it: contact and force from its readings, and in contact
 /// friction and p.
@@ -298,7 +298,7 @@ impl Estimators {
         let held_counts2 = 0.5 * release.norm_squared() - release.dot(&innovation);
         let moved = joints.moved;
         let mut gap_m = self.gap_m();
-        let gap_error_m = GAP_UNCERTAINTY_M + self.calibrator.gap_error_m(rounding_m);
+        let gap_error_m = RESOLVED_M + self.calibrator.gap_error_m(rounding_m);
         if self.calibrator.is_open() || gap_m < -gap_error_m {
             self.calibrator.restart(&mut self.arm, gap_m);
             gap_m = 0.0;

@@ -15,6 +15,7 @@ use painleve_shared::contact::ScaledRow;
 use painleve_shared::{Arm, Posture, Real, settings};
 
 use self::search::Search;
+use crate::estimate::RESOLVED_M;
 use crate::estimate::friction::FrictionEstimate;
 use crate::refer::reference::TipReference;
 
@@ -24,8 +25,6 @@ pub const USABLE_REACH: f32 = 0.995;
 /// Distance within which two places count as the same, m. A reference that moves farther in a tick is a jump, with which the
 /// governor catches up; a thrown tip is lowered within it of its landing point.
 pub const NEAR_M: f32 = 2e-3;
-/// A reference nearer than this, m, has been caught up with.
-const CAUGHT_M: f32 = 2e-5;
 /// Lack of p at a place from which the kept distance is out of reach, 1/(kg·m), times 1 m and its distance from the middle: more
 /// than anywhere else, so that of such places the innermost counts as the best.
 const OUT_OF_REACH_PER_KG_M: f32 = 1e9;
@@ -200,7 +199,7 @@ impl EdgeGovernor {
         // A reference that moves or is about to is on its way of one tick, or this far from it.
         let half_way_m = 0.5 * speed * tick_s;
         let away_m = (wanted.position_m - before.position_m - half_way_m).abs() - half_way_m.abs();
-        let near_m = if self.follows { NEAR_M } else { CAUGHT_M };
+        let near_m = if self.follows { NEAR_M } else { RESOLVED_M };
         self.follows = !enabled || (!self.at_edge && !outside(stop_m) && away_m < near_m);
         if self.follows {
             self.last = *wanted;

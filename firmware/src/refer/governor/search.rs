@@ -7,7 +7,8 @@ const STEPS_OVER_REACH: f32 = 32.0;
 /// Largest number of inadmissible points that the search tries beside the tip, on both sides together. A stretch farther
 /// off is not for this tip: on the way there it would be thrown off.
 const MOST_REFUSED: u32 = STEPS_OVER_REACH as u32 / 4;
-/// Halvings of the last step: 12 mm / 2¹⁰ is 11 µm.
+/// Halvings of the last step: 12 mm / 2¹⁰ is 11 µm. The interval's width would not end every search: the calibration may put the
+/// reach below a point already found.
 const HALVINGS: u32 = 10;
 
 /// Phase of the search.

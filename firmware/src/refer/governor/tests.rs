@@ -307,7 +307,7 @@ fn a_moving_reference_is_caught_without_a_step_at_any_rate() {
             let step_m = (reference.position_m - last.position_m).abs();
             let fastest_m_s = reference.velocity_m_s.abs().max(last.velocity_m_s.abs());
             assert!(
-                step_m < fastest_m_s * tick_s + CAUGHT_M + 1e-7,
+                step_m < fastest_m_s * tick_s + RESOLVED_M + 1e-7,
                 "{tick}: {step_m}"
             );
             last = reference;
