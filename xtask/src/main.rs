@@ -14,6 +14,7 @@ mod fmu;
 mod fuzz;
 mod measure;
 mod newcomer;
+mod options;
 mod policy;
 mod python;
 mod setup;

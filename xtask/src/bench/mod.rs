@@ -14,6 +14,7 @@ use clap::Args;
 use serde_json::Value;
 
 use crate::command::{ChoreError, answer, cargo, run_cargo, say, workspace};
+use crate::options::number;
 use crate::size;
 use machine::Machine;
 use samples::Samples;
@@ -26,11 +27,15 @@ const END: &str = "<!-- end -->";
 #[derive(Debug, Args)]
 pub struct BenchArguments {
     /// Runs of the robustness campaign.
-    #[arg(long, default_value_t = 10_000)]
+    #[arg(long, default_value_t = 10_000, value_parser = runs)]
     runs: u32,
     /// Print the table without writing it to the document.
     #[arg(long)]
     dry_run: bool,
+}
+
+fn runs(text: &str) -> Result<u32, String> {
+    number(text, 1..=10_000_000, "a number of runs")
 }
 
 /// The command.
