@@ -1,7 +1,7 @@
 //! Random frames that no arm would send: for any input, the controller's torque stays within the
 //! limit, its faults stay latched, and off means zero torque.
 //!
-//! `PAINLEVE_FUZZ_TICKS` sets the number of ticks per scenario.
+//! `PAINLEVE_FUZZ_TICKS` sets the number of ticks per scenario, at least 10,000.
 
 use painleve_plant::Controller;
 use painleve_plant::scenario::{Scenario, built_in};
@@ -12,6 +12,8 @@ use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 
 const TICKS: u64 = 100_000;
+/// Fewer ticks may not drive every arm and cause a fault.
+const LEAST_TICKS: u64 = 10_000;
 /// Ticks between two changes of the kind of frames.
 const PHASE: u64 = 200;
 
@@ -94,6 +96,10 @@ fn no_frame_drives_the_controller_beyond_its_limits() {
         .ok()
         .and_then(|text| text.parse().ok())
         .unwrap_or(TICKS);
+    assert!(
+        ticks >= LEAST_TICKS,
+        "PAINLEVE_FUZZ_TICKS={ticks} are too few to drive every arm: give at least {LEAST_TICKS}"
+    );
     for (seed, name) in built_in::names().enumerate() {
         let scenario = Scenario::load(name, &[]).unwrap();
         let torque = &scenario.converters.torque;
@@ -144,7 +150,7 @@ fn no_frame_drives_the_controller_beyond_its_limits() {
         let has_law = scenario.controller.law.name() != "off";
         assert!(
             !has_law || (driven > ticks / 1000 && faults > ticks / 10_000),
-            "{name}: {driven}, {faults}"
+            "{name}: of {ticks} ticks {driven} drive the arm, and {faults} faults occur"
         );
     }
 }
