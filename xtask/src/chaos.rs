@@ -1,9 +1,12 @@
 //! `cargo xtask chaos`: the test in `tests/chaos`, on the program under test.
 
-use clap::Args;
+use clap::{Args, Parser};
 
 use crate::command::ChoreError;
 use crate::under_test::{chaos, run_on_program};
+
+#[path = "../../tests/chaos/src/arguments.rs"]
+mod arguments;
 
 /// Options of the test, which `--help` lists.
 #[derive(Debug, Args)]
@@ -35,9 +38,37 @@ pub fn nightly() -> Result<(), ChoreError> {
 /// If it does not build, finds a flaw, or disturbs nothing.
 pub fn run(arguments: &ChaosArguments) -> Result<(), ChoreError> {
     let options: Vec<_> = arguments.options.iter().map(String::as_str).collect();
+    // Help and refusals need no build.
+    if let Err(answer) = checked(&options) {
+        answer.exit();
+    }
     start(&options)
+}
+
+fn checked(options: &[&str]) -> Result<arguments::ChaosArguments, clap::Error> {
+    let name = ["cargo xtask chaos"];
+    arguments::ChaosArguments::try_parse_from(name.iter().chain(options))
 }
 
 fn start(options: &[&str]) -> Result<(), ChoreError> {
     run_on_program(&chaos().to_string_lossy(), options, &[])
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::error::ErrorKind;
+
+    use super::*;
+
+    #[test]
+    fn help_and_unknown_options_are_answered_before_anything_is_built() {
+        for (option, expected) in [
+            ("--help", ErrorKind::DisplayHelp),
+            ("--trails=5", ErrorKind::UnknownArgument),
+            ("--host=board", ErrorKind::InvalidValue),
+        ] {
+            assert_eq!(checked(&[option]).unwrap_err().kind(), expected, "{option}");
+        }
+        checked(&["--trials=120", "--stop-after-s=20", "--end-s=8"]).unwrap();
+    }
 }

@@ -7,11 +7,12 @@ use std::time::{Duration, Instant};
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
 
+use crate::arguments::Disturbance;
 use crate::host::EMULATOR;
 use crate::place::ChaosFolder;
 use crate::trial::{
-    ChaosRole, Disturbance, ExpectedOutcome, Flaw, NOTICED, Plan, TrialOutcome, TrialProcess,
-    command, judge, next_run, orphans,
+    ChaosRole, ExpectedOutcome, Flaw, NOTICED, Plan, TrialOutcome, TrialProcess, command, judge,
+    next_run, orphans,
 };
 
 /// Disturbs the emulator of a run, `plan.call` milliseconds after its start.

@@ -7,25 +7,15 @@ use std::os::fd::AsFd;
 use std::path::Path;
 use std::process::{Child, Stdio};
 
-use clap::ValueEnum;
 use nix::fcntl::OFlag;
 use nix::sys::termios::{SetArg, cfmakeraw, tcgetattr, tcsetattr};
 use painleve_tests::line::emulator;
 use rustix::termios::ioctl_tiocnxcl;
 use serde_json::Value;
 
-pub const EMULATOR: &str = "qemu-system-arm";
+use crate::arguments::ChaosHost;
 
-/// Kind of host.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum ChaosHost {
-    /// The controller in its own process.
-    Native,
-    /// The image under QEMU.
-    Qemu,
-    /// The image under QEMU behind a serial line.
-    Serial,
-}
+pub const EMULATOR: &str = "qemu-system-arm";
 
 /// A running host with its command-line arguments.
 pub struct ChaosController {

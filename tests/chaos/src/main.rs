@@ -6,6 +6,7 @@
 //! run on the same bus gives the correct log hash. The controller is a native process, or the image
 //! under QEMU, directly or behind a serial line.
 
+mod arguments;
 mod emulator;
 mod fault;
 mod host;
@@ -23,55 +24,12 @@ use std::time::{Duration, Instant};
 use clap::Parser;
 use nix::sys::prctl::set_child_subreaper;
 
+use arguments::{ChaosArguments, ChaosHost, Disturbance};
 use fault::{FAULTS, InjectedFault};
-use host::{ChaosController, ChaosHost};
+use host::ChaosController;
 use place::{ChaosFolder, unused_segments};
 use table::TrialTable;
-use trial::{ChaosRole, Disturbance, ExpectedOutcome, Plan, TrialProcess};
-
-/// Disturbs plant and controller at every system call and counts the flaws.
-#[derive(Debug, Parser)]
-#[command(name = "cargo xtask chaos")]
-struct ChaosArguments {
-    /// First system call.
-    #[arg(long, default_value_t = 1)]
-    first: u32,
-    /// Last system call.
-    #[arg(long, default_value_t = 300)]
-    last: u32,
-    /// Only these disturbances.
-    #[arg(long, value_enum, value_delimiter = ',', default_values_t = Disturbance::ALL)]
-    disturbances: Vec<Disturbance>,
-    /// Number of trials, drawn from all with --seed.
-    #[arg(long)]
-    trials: Option<usize>,
-    /// Begin no trial after so many seconds.
-    #[arg(long, value_name = "SECONDS")]
-    stop_after_s: Option<u64>,
-    /// Seed of the draw.
-    #[arg(long, default_value_t = 1)]
-    seed: u64,
-    /// Instead of sending signals, make the first N calls of each kind fail: no space, a bad disk,
-    /// no descriptors, no memory, an interruption. Requires strace.
-    #[arg(long, value_name = "N", default_value_t = 0)]
-    faults: u32,
-    /// Seconds within which all processes must have ended after a disturbance. Exceed the
-    /// guaranteed 5 s only where other work keeps the machine busy; the limits of silence grow along.
-    #[arg(long, default_value_t = 5)]
-    end_s: u64,
-    /// Number of parallel trials.
-    #[arg(long, default_value_t = 4)]
-    jobs: usize,
-    /// Number of additional plants and controllers on the bus of every trial.
-    #[arg(long, default_value_t = 0)]
-    crowd: u32,
-    /// What runs the controller.
-    #[arg(long, value_enum, default_value = "native")]
-    host: ChaosHost,
-    /// So many threads keep the machine busy meanwhile.
-    #[arg(long, default_value_t = 0)]
-    load: usize,
-}
+use trial::{ChaosRole, ExpectedOutcome, Plan, TrialProcess};
 
 /// Time for other processes to remove their present segments.
 const OTHERS: Duration = Duration::from_secs(10);

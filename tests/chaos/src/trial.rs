@@ -6,9 +6,9 @@ use std::process::{Child, Command};
 use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
 
+use crate::arguments::Disturbance;
 use crate::place::ChaosFolder;
 use crate::tracer::{Traced, Victim};
-use clap::ValueEnum;
 use nix::sys::signal::{Signal, kill};
 use nix::unistd::Pid;
 
@@ -35,33 +35,13 @@ pub enum ChaosRole {
     Emulator,
 }
 
-/// Kind of disturbance.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, ValueEnum)]
-pub enum Disturbance {
-    Kill,
-    Stop,
-    /// The process is stopped, and continued while its peer still waits.
-    Pause,
-    Terminate,
-    Interrupt,
-}
-
-impl Disturbance {
-    pub const ALL: [Self; 5] = [
-        Self::Kill,
-        Self::Stop,
-        Self::Pause,
-        Self::Terminate,
-        Self::Interrupt,
-    ];
-
-    fn signal(self) -> Signal {
-        match self {
-            Self::Kill => Signal::SIGKILL,
-            Self::Stop | Self::Pause => Signal::SIGSTOP,
-            Self::Terminate => Signal::SIGTERM,
-            Self::Interrupt => Signal::SIGINT,
-        }
+/// Returns the signal that disturbs.
+fn signal(disturbance: Disturbance) -> Signal {
+    match disturbance {
+        Disturbance::Kill => Signal::SIGKILL,
+        Disturbance::Stop | Disturbance::Pause => Signal::SIGSTOP,
+        Disturbance::Terminate => Signal::SIGTERM,
+        Disturbance::Interrupt => Signal::SIGINT,
     }
 }
 
@@ -142,7 +122,7 @@ pub fn run(
     if plan.victim != ChaosRole::Run && !plan.peer_first {
         peer = Some(start_peer()?);
     }
-    let traced = victim.signal_at(plan.call, plan.disturbance.signal(), REACH)?;
+    let traced = victim.signal_at(plan.call, signal(plan.disturbance), REACH)?;
     let disturbed = Instant::now();
     let reached = traced == Traced::Injected;
     let mut victim = TrialProcess {

@@ -1,0 +1,79 @@
+//! The options of the chaos. `cargo xtask chaos` contains this file, too, to refuse options before it builds anything.
+
+use clap::{Parser, ValueEnum};
+
+/// Disturbs plant and controller at every system call and counts the flaws.
+#[derive(Debug, Parser)]
+#[command(name = "cargo xtask chaos")]
+pub struct ChaosArguments {
+    /// First system call.
+    #[arg(long, default_value_t = 1)]
+    pub first: u32,
+    /// Last system call.
+    #[arg(long, default_value_t = 300)]
+    pub last: u32,
+    /// Only these disturbances.
+    #[arg(long, value_enum, value_delimiter = ',', default_values_t = Disturbance::ALL)]
+    pub disturbances: Vec<Disturbance>,
+    /// Number of trials, drawn from all with --seed.
+    #[arg(long)]
+    pub trials: Option<usize>,
+    /// Begin no trial after so many seconds.
+    #[arg(long, value_name = "SECONDS")]
+    pub stop_after_s: Option<u64>,
+    /// Seed of the draw.
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
+    /// Instead of sending signals, make the first N calls of each kind fail: no space, a bad disk,
+    /// no descriptors, no memory, an interruption. Requires strace.
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    pub faults: u32,
+    /// Seconds within which all processes must have ended after a disturbance. Exceed the
+    /// guaranteed 5 s only where other work keeps the machine busy; the limits of silence grow along.
+    #[arg(long, default_value_t = 5)]
+    pub end_s: u64,
+    /// Number of parallel trials.
+    #[arg(long, default_value_t = 4)]
+    pub jobs: usize,
+    /// Number of additional plants and controllers on the bus of every trial.
+    #[arg(long, default_value_t = 0)]
+    pub crowd: u32,
+    /// What runs the controller.
+    #[arg(long, value_enum, default_value = "native")]
+    pub host: ChaosHost,
+    /// So many threads keep the machine busy meanwhile.
+    #[arg(long, default_value_t = 0)]
+    pub load: usize,
+}
+
+/// Kind of disturbance.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, ValueEnum)]
+pub enum Disturbance {
+    Kill,
+    Stop,
+    /// The process is stopped, and continued while its peer still waits.
+    Pause,
+    Terminate,
+    Interrupt,
+}
+
+impl Disturbance {
+    pub const ALL: [Self; 5] = [
+        Self::Kill,
+        Self::Stop,
+        Self::Pause,
+        Self::Terminate,
+        Self::Interrupt,
+    ];
+}
+
+/// Kind of host of the controller.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum ChaosHost {
+    /// The controller in its own process.
+    Native,
+    /// The image under QEMU.
+    Qemu,
+    /// The image under QEMU behind a serial line.
+    Serial,
+}
