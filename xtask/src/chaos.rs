@@ -1,6 +1,6 @@
 //! `cargo xtask chaos`: the test in `tests/chaos`, on the program under test.
 
-use clap::{Args, Parser};
+use clap::Args;
 
 use crate::command::ChoreError;
 use crate::under_test::{chaos, run_on_program};
@@ -47,7 +47,7 @@ pub fn run(arguments: &ChaosArguments) -> Result<(), ChoreError> {
 
 fn checked(options: &[&str]) -> Result<arguments::ChaosArguments, clap::Error> {
     let name = ["cargo xtask chaos"];
-    arguments::ChaosArguments::try_parse_from(name.iter().chain(options))
+    arguments::ChaosArguments::read(name.iter().chain(options))
 }
 
 fn start(options: &[&str]) -> Result<(), ChoreError> {
@@ -69,6 +69,45 @@ mod tests {
         ] {
             assert_eq!(checked(&[option]).unwrap_err().kind(), expected, "{option}");
         }
+        checked(&["--first=300", "--trials=1", "--jobs=1"]).unwrap();
         checked(&["--trials=120", "--stop-after-s=20", "--end-s=8"]).unwrap();
+    }
+
+    #[test]
+    fn options_by_which_no_trial_begins_are_refused() {
+        for (options, expected) in [
+            (
+                &["--jobs=0"][..],
+                "invalid value '0' for '--jobs <JOBS>': 0 is not in 1..=256",
+            ),
+            (
+                &["--trials=0"],
+                "invalid value '0' for '--trials <TRIALS>': 0 is not in 1..=",
+            ),
+            (
+                &["--first=0"],
+                "invalid value '0' for '--first <FIRST>': 0 is not in 1..=",
+            ),
+            (
+                &["--last=0"],
+                "invalid value '0' for '--last <LAST>': 0 is not in 1..=",
+            ),
+            (
+                &["--stop-after-s=0"],
+                "'0' for '--stop-after-s <SECONDS>': 0 is not in 1..=",
+            ),
+            (
+                &["--end-s=0"],
+                "'0' for '--end-s <END_S>': 0 is not in 1..=3600",
+            ),
+            (
+                &["--first=10", "--last=5"],
+                "--last 5 is before --first 10: give --last from 10 to 1000000",
+            ),
+            (&["--first=301"], "--last 300 is before --first 301"),
+        ] {
+            let message = checked(options).unwrap_err().to_string();
+            assert!(message.contains(expected), "{message}");
+        }
     }
 }

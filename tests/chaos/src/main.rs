@@ -21,7 +21,6 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
-use clap::Parser;
 use nix::sys::prctl::set_child_subreaper;
 
 use arguments::{ChaosArguments, ChaosHost, Disturbance};
@@ -41,7 +40,9 @@ const PATIENCE: [f64; 2] = [0.3, 0.34];
 const WORKER_PANICKED: &str = "a worker has panicked";
 
 fn main() -> ExitCode {
-    match run(&ChaosArguments::parse()) {
+    let arguments =
+        ChaosArguments::read(std::env::args_os()).unwrap_or_else(|answer| answer.exit());
+    match run(&arguments) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("error: {error}");
