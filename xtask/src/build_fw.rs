@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use crate::boards;
-use crate::command::{ChoreError, cargo, run_with, workspace};
+use crate::command::{ChoreError, cargo, run_with, say, workspace};
 use crate::files::copy;
 
 /// The boards' target.
@@ -22,6 +22,25 @@ enum Toolchain {
     Installed,
     /// Built from Debian's sources by Debian's compiler.
     Debian,
+}
+
+/// Builds every image and says where they are.
+///
+/// # Errors
+/// As [`run`].
+pub fn run_chore() -> Result<(), ChoreError> {
+    run()?;
+    for board in boards::all()? {
+        for name in &board.images {
+            say(&place(name))?;
+        }
+    }
+    Ok(())
+}
+
+/// Returns the path of a built image in the workspace.
+fn place(name: &str) -> String {
+    format!("target/{TARGET}/{PROFILE}/{name}")
 }
 
 /// Builds every image.
@@ -83,12 +102,12 @@ pub fn build(
 
 /// Returns the folder of the built images.
 pub fn folder() -> PathBuf {
-    workspace().join("target").join(TARGET).join(PROFILE)
+    workspace().join(place(""))
 }
 
 /// Returns the path of a built image.
 pub fn image(name: &str) -> PathBuf {
-    folder().join(name)
+    workspace().join(place(name))
 }
 
 /// Returns whether `rustc` has the core library of a target.

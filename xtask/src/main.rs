@@ -41,7 +41,7 @@ enum Chore {
     Test(test::TestArguments),
     /// Install the microcontroller's Rust target, QEMU and Unicorn, if missing.
     Setup(setup::SetupArguments),
-    /// Build the controller's images for the microcontroller.
+    /// Build the controller's images for the microcontroller, and say where they are.
     BuildFw,
     /// Print flash, RAM and stack use of the images, with their limits.
     Size,
@@ -73,7 +73,7 @@ fn main() -> ExitCode {
     let result = match Xtask::parse().chore {
         Chore::Test(arguments) => test::run(&arguments),
         Chore::Setup(arguments) => setup::run(&arguments),
-        Chore::BuildFw => build_fw::run(),
+        Chore::BuildFw => build_fw::run_chore(),
         Chore::Size => size::run(),
         Chore::Flash(arguments) => flash::run(&arguments),
         Chore::Examples => examples::run(),
