@@ -92,10 +92,11 @@ pub fn output(command: &mut Command) -> Result<String, ChoreError> {
     if !output.status.success() {
         let reason = String::from_utf8_lossy(&output.stderr);
         let status = output.status;
-        return Err(ChoreError(format!(
-            "{name} fails ({status}): {}",
-            reason.trim()
-        )));
+        return Err(ChoreError(match reason.trim() {
+            // The program has printed it itself, or has none.
+            "" => format!("{name} fails ({status})"),
+            reason => format!("{name} fails ({status}): {reason}"),
+        }));
     }
     Ok(String::from_utf8_lossy(&output.stdout).into_owned())
 }
@@ -116,4 +117,20 @@ pub fn answer(program: &str, arguments: &[&str]) -> Result<String, ChoreError> {
 /// As [`run`].
 pub fn run_cargo(arguments: &[&str]) -> Result<(), ChoreError> {
     run(&cargo(), arguments)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_failure_gives_the_reason_that_the_program_prints() {
+        let failure = |script: &str| {
+            let failure = output(Command::new("sh").args(["-c", script])).unwrap_err();
+            failure.to_string()
+        };
+        let failed = "sh fails (exit status: 3)";
+        assert_eq!(failure("echo why >&2; exit 3"), format!("{failed}: why"));
+        assert_eq!(failure("exit 3"), failed);
+    }
 }
