@@ -22,7 +22,7 @@ use crate::connection::{Connection, PATIENCE};
 use crate::foxglove;
 use crate::hub::{Hub, PageQueue};
 use crate::locked;
-use crate::receive::{receive, turn_away};
+use crate::receive::{conclude, receive, turn_away};
 use crate::request::{Desk, Orders};
 
 /// Time between two messages to a viewer.
@@ -170,8 +170,13 @@ impl Service {
             return Ok(());
         };
         let mut desk = Desk::new(self.orders.clone());
-        while exchange(&mut socket, &waiting, &mut desk).is_ok() {}
+        let end = loop {
+            if let Err(end) = exchange(&mut socket, &waiting, &mut desk) {
+                break end;
+            }
+        };
         self.hub.pages.leave(&waiting);
+        conclude(socket, &end);
         Ok(())
     }
 }
@@ -413,6 +418,45 @@ mod tests {
             Message::binary(vec![2]),
         ] {
             assert_eq!(page.read().unwrap(), expected);
+        }
+    }
+
+    #[test]
+    fn a_viewer_that_leaves_or_errs_is_told_by_a_close_frame() {
+        let server = server(&[]);
+        let address = server.address;
+        let mask = [0; 4];
+        let long = [&b"\x81\xfe\xff\xff"[..], &mask, &[b' '; 0xffff]].concat();
+        for (path, protocol) in [
+            ("/live", ""),
+            ("/", "Sec-WebSocket-Protocol: foxglove.sdk.v1\r\n"),
+        ] {
+            for (frame, code) in [
+                // 1000, which the answer repeats.
+                (&b"\x88\x82\0\0\0\0\x03\xe8"[..], 1000_u16),
+                (&long, 1009),
+                (b"\x81\x81\0\0\0\0\xff", 1007),
+                // Without a mask, and of an unknown kind.
+                (b"\x81\x01x", 1002),
+                (b"\x83\x81\0\0\0\0x", 1002),
+            ] {
+                let mut stream = TcpStream::connect(address).unwrap();
+                stream.set_read_timeout(Some(2 * PATIENCE)).unwrap();
+                let head = format!(
+                    "GET {path} HTTP/1.1\r\nHost: {address}\r\n{KEY}{protocol}Connection: Upgrade\r\n\
+                     Upgrade: websocket\r\n\r\n"
+                );
+                stream.write_all(head.as_bytes()).unwrap();
+                stream.write_all(frame).unwrap();
+                let start = Instant::now();
+                let mut answer = Vec::new();
+                stream.read_to_end(&mut answer).unwrap();
+                let close = answer.iter().rposition(|byte| *byte == 0x88).unwrap();
+                let (length, payload) = (answer[close + 1], &answer[close + 2..]);
+                assert_eq!(payload.len(), usize::from(length), "{code}");
+                assert_eq!(payload[..2], code.to_be_bytes(), "{path}");
+                assert!(start.elapsed() < PATIENCE, "{code}");
+            }
         }
     }
 

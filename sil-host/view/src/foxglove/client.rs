@@ -17,7 +17,7 @@ use super::services;
 use crate::hub::{ClientQueue, Entry, Hub, Severity, WatchedTick};
 use crate::locked;
 use crate::parameters::Parameter;
-use crate::receive::{receive, turn_away};
+use crate::receive::{conclude, receive, turn_away};
 use crate::request::{Desk, TOO_MANY};
 
 /// First bytes of binary messages.
@@ -73,11 +73,16 @@ pub(crate) fn serve(socket: WebSocket<TcpStream>, hub: &Hub, desk: Desk) {
         subscriptions: [None; CHANNELS],
         watched: BTreeSet::new(),
     };
-    // Every error means that the client has left.
-    if client.greet().is_ok() {
-        while client.exchange().is_ok() {}
+    // Every error ends the conversation.
+    let mut state = client.greet();
+    while state.is_ok() {
+        state = client.exchange();
     }
+    let Client { socket, .. } = client;
     hub.clients.leave(&queue);
+    if let Err(end) = state {
+        conclude(socket, &end);
+    }
 }
 
 struct Client<'a> {
