@@ -250,6 +250,7 @@ fn reason(status: StatusCode) -> &'static str {
              need --live-origin.\n"
         }
         StatusCode::NOT_FOUND => "There is nothing at this address.\n",
+        StatusCode::METHOD_NOT_ALLOWED => "Only GET and HEAD are allowed.\n",
         _ => "This is not a request for a page or a WebSocket.\n",
     }
 }
@@ -354,6 +355,49 @@ mod tests {
         ] {
             let request = format!("GET {path} HTTP/1.1\r\n{headers}\r\n");
             assert_eq!(status(&server, &request), expected, "{request}");
+        }
+    }
+
+    #[test]
+    fn the_head_alone_can_be_requested_and_other_methods_are_not_allowed() {
+        let server = server(&[]);
+        let address = server.address;
+        let answer = |method: &str, path: &str, more: &str| {
+            let mut stream = TcpStream::connect(address).unwrap();
+            let request = format!("{method} {path} HTTP/1.1\r\nHost: {address}\r\n{more}\r\n");
+            stream.write_all(request.as_bytes()).unwrap();
+            let mut answer = String::new();
+            stream.read_to_string(&mut answer).unwrap();
+            answer
+        };
+        let upgrade = format!("{KEY}Connection: Upgrade\r\nUpgrade: websocket\r\n");
+        for (path, more, status) in [
+            ("/", "", "200 OK"),
+            ("/etc", "", "404 Not Found"),
+            ("/", "Origin: null\r\n", "403 Forbidden"),
+            ("/", "no header\r\n", "400 Bad Request"),
+        ] {
+            let whole = answer("GET", path, more);
+            let (head, body) = whole.split_once("\r\n\r\n").unwrap();
+            assert!(
+                head.starts_with(&format!("HTTP/1.1 {status}\r\n")),
+                "{head}"
+            );
+            assert!(!body.is_empty());
+            assert_eq!(answer("HEAD", path, more), format!("{head}\r\n\r\n"));
+        }
+        let refused = answer("HEAD", "/live", &upgrade);
+        assert!(
+            refused.starts_with("HTTP/1.1 400 Bad Request\r\n"),
+            "{refused}"
+        );
+        for method in ["POST", "PUT", "OPTIONS", "DELETE"] {
+            let refused = answer(method, "/", "");
+            assert!(
+                refused.starts_with("HTTP/1.1 405 Method Not Allowed\r\n"),
+                "{refused}"
+            );
+            assert!(refused.contains("\r\nAllow: GET, HEAD\r\n"), "{refused}");
         }
     }
 
