@@ -12,8 +12,8 @@ use serde_json::{Value, json};
 use crate::messages::nanoseconds;
 use crate::recorder::RecordedTick;
 
-/// Rate of the scene, Hz.
-const RATE_HZ: u32 = 60;
+/// Rate of the scene, Hz. Where there are fewer ticks, each has a picture.
+const RATE_HZ: u64 = 60;
 /// Stripes painted across the belt, which show that it moves.
 const STRIPES: i32 = 12;
 /// Length of the force arrow, m for 1 N.
@@ -26,7 +26,7 @@ const BELT_THICKNESS_M: f64 = 0.006;
 #[derive(Clone, Debug)]
 pub struct Scene {
     arm: ArmParameters<f64>,
-    ticks_per_picture: u64,
+    tick_hz: u64,
     tick: u64,
     /// Distance that the belt has moved, m, and when it was last updated, s.
     travel_m: f64,
@@ -47,17 +47,17 @@ impl Scene {
     pub fn new(scenario: &Scenario) -> Self {
         Self {
             arm: scenario.arm,
-            ticks_per_picture: u64::from((scenario.run.tick_hz / RATE_HZ).max(1)),
+            tick_hz: scenario.run.tick_hz.into(),
             tick: 0,
             travel_m: 0.0,
             last_s: None,
         }
     }
 
-    /// Receives a tick; returns a picture 60 times a second.
+    /// Receives a tick; returns a picture 60 times a second on average.
     pub fn tick(&mut self, tick: &RecordedTick<'_>) -> Option<Picture> {
         self.advance(tick);
-        let is_due = self.tick.is_multiple_of(self.ticks_per_picture);
+        let is_due = is_due(self.tick, self.tick_hz);
         self.tick += 1;
         is_due.then(|| self.picture(tick))
     }
@@ -128,6 +128,11 @@ impl Scene {
             ..Primitives::default()
         }
     }
+}
+
+/// Returns whether a tick is the first in a period of the scene.
+fn is_due(tick: u64, tick_hz: u64) -> bool {
+    tick * RATE_HZ % tick_hz < RATE_HZ
 }
 
 /// Primitives of one entity.
@@ -253,4 +258,19 @@ fn pose(at: [f64; 3], about_y: f64) -> Value {
 
 fn colour([r, g, b]: [f64; 3], a: f64) -> Value {
     json!({ "r": r, "g": g, "b": b, "a": a })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_scene_has_its_rate_at_any_rate_of_ticks() {
+        for tick_hz in [10, 59, 60, 61, 100, 1000, 1024, 100_000] {
+            let ticks = 0..10 * tick_hz;
+            let pictures = ticks.filter(|tick| is_due(*tick, tick_hz)).count();
+            assert_eq!(pictures as u64, 10 * tick_hz.min(RATE_HZ), "{tick_hz} Hz");
+            assert!(is_due(0, tick_hz));
+        }
+    }
 }
