@@ -15,9 +15,12 @@ use crate::record_file::{Damage, Extent, RecordedMessage, messages};
 /// Why a record cannot be exported.
 #[derive(Debug, thiserror::Error)]
 pub enum ExportError {
+    /// The file was made from a record and does not hold all of it.
+    #[error("this is a ROS 2 bag: export the record from which it was made")]
+    Bag,
     /// The record is damaged, and nothing is exported.
     #[error("not a complete MCAP file, and no tick in it is intact: {0}")]
-    Incomplete(#[from] Damage),
+    Incomplete(#[source] Damage),
     /// The record is damaged behind whole ticks.
     #[error(
         "it is damaged after {whole_bytes} bytes: {reason}; `painleve export --csv --recover` exports the {rows} ticks \
@@ -42,6 +45,15 @@ pub enum ExportError {
     /// What is exported cannot be written.
     #[error(transparent)]
     Write(#[from] csv::Error),
+}
+
+impl From<Damage> for ExportError {
+    fn from(damage: Damage) -> Self {
+        match damage {
+            Damage::Bag => Self::Bag,
+            damage => Self::Incomplete(damage),
+        }
+    }
 }
 
 /// What was exported.
@@ -121,7 +133,7 @@ pub(crate) fn ticks_and_events(
         rows.end_row()?;
     }
     if rows.written == 0 {
-        return Err(damage.map_or(ExportError::NoTicks, ExportError::Incomplete));
+        return Err(damage.map_or(ExportError::NoTicks, ExportError::from));
     }
     rows.writer.flush().map_err(csv::Error::from)?;
     Ok(Exported {

@@ -21,6 +21,9 @@ pub const MOST_BYTES: usize = 8 << 20;
 /// Name of the metadata in which a run describes itself.
 pub const NOTES: &str = "painleve";
 
+/// Profile of the ROS 2 bags that are made from records.
+pub(crate) const BAG: &str = "ros2";
+
 /// What is wrong with a record.
 #[derive(Debug, thiserror::Error)]
 pub enum Damage {
@@ -30,6 +33,9 @@ pub enum Damage {
     /// The file, or a part of it, is not MCAP.
     #[error(transparent)]
     Mcap(#[from] McapError),
+    /// The file is MCAP, but not a record.
+    #[error("this is a ROS 2 bag: give the record from which it was made")]
+    Bag,
     /// A chunk is longer than any chunk of a run.
     #[error("a chunk has {0} bytes, more than {MOST_BYTES}")]
     LongChunk(u64),
@@ -143,6 +149,13 @@ fn records<E: From<Damage>>(
                 bytes_read += read as u64;
             }
             LinearReadEvent::Record { opcode, data } => {
+                if opcode == op::HEADER
+                    && let Record::Header(header) =
+                        parse_record(opcode, data).map_err(Damage::from)?
+                    && header.profile == BAG
+                {
+                    return Err(Damage::Bag.into());
+                }
                 // Behind the data, the file repeats what it holds, for readers that seek.
                 is_in_data &= opcode != op::DATA_END;
                 if is_in_data && !take(opcode, data)? {

@@ -17,7 +17,7 @@ use serde_json::{Map, Value};
 use crate::export::ExportError;
 use crate::fields::{ESTIMATES, PLANT, Read as Kind, TOPICS, Topic};
 use crate::mcap_log::reason;
-use crate::record_file::{Damage, Extent, RecordedMessage, messages};
+use crate::record_file::{BAG, Damage, Extent, RecordedMessage, messages};
 
 /// Definition of the header of every message, and of the time in it.
 const HEADER: &str = "builtin_interfaces/Time stamp\nstring frame_id\n";
@@ -78,7 +78,7 @@ struct Bag<W: Write + Seek> {
 impl<W: Write + Seek> Bag<W> {
     fn new(start_ns: u64, output: W) -> Result<Self, ExportError> {
         let mut writer = mcap::WriteOptions::new()
-            .profile("ros2")
+            .profile(BAG)
             .library(concat!("painleve ", env!("CARGO_PKG_VERSION")))
             .create(output)?;
         let mut channel = |topic: &str, schema: &str, definition: String| {
@@ -286,6 +286,7 @@ mod tests {
     use std::io;
 
     use super::*;
+    use crate::export::ticks_to_csv;
     use crate::mcap_log::tests::of_messages;
 
     #[test]
@@ -293,6 +294,18 @@ mod tests {
         let full = io::Cursor::new([0_u8; 16]);
         let error = to_bag(io::empty(), 0, full).map(|_| ()).unwrap_err();
         assert_eq!(error.to_string(), "failed to write whole buffer");
+    }
+
+    #[test]
+    fn a_bag_is_not_taken_for_a_damaged_record() {
+        let record = of_messages("/plant", &[(1, "{}")]);
+        let bag = to_bag(&record[..], 0, io::Cursor::new(Vec::new()));
+        let bag = bag.unwrap().0.into_inner();
+        let expected = "this is a ROS 2 bag: export the record from which it was made";
+        let table = ticks_to_csv(&bag[..], io::sink()).unwrap_err();
+        assert_eq!(table.to_string(), expected);
+        let again = to_bag(&bag[..], 0, io::Cursor::new(Vec::new()));
+        assert_eq!(again.map(|_| ()).unwrap_err().to_string(), expected);
     }
 
     #[test]
