@@ -54,7 +54,19 @@ pub enum AtomicFileError {
         /// The link.
         link: PathBuf,
     },
-    /// A parent folder does not exist and cannot be created, or cannot be opened.
+    /// A folder on the way cannot be opened.
+    #[error(
+        "cannot open the folder `{folder}` to write `{path}`: {source}; choose a path that can be written"
+    )]
+    ClosedFolder {
+        /// The requested path.
+        path: PathBuf,
+        /// The folder.
+        folder: PathBuf,
+        /// Error of the operating system.
+        source: io::Error,
+    },
+    /// A parent folder does not exist and cannot be created.
     #[error(
         "cannot create the folder `{folder}` for `{path}`: {source}; choose a path that can be written"
     )]
@@ -97,6 +109,11 @@ impl AtomicFileError {
             PlaceError::Dangling(link) => Self::Dangling { path, link },
             PlaceError::Foreign(link) => Self::ForeignLink { path, link },
             PlaceError::Folder(folder, source) => Self::Folder {
+                path,
+                folder,
+                source,
+            },
+            PlaceError::Closed(folder, source) => Self::ClosedFolder {
                 path,
                 folder,
                 source,
@@ -389,7 +406,7 @@ pub fn prepare(path: impl Into<PathBuf>, contents: &[u8]) -> Result<AtomicFile, 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use nix::unistd::geteuid;
+    use nix::unistd::{Uid, geteuid, setfsuid};
     use std::os::fd::AsRawFd;
     use std::os::unix::fs::{PermissionsExt, lchown, symlink};
 
@@ -658,6 +675,28 @@ mod tests {
         let error = write(file.join("run.svg"), b"").unwrap_err().to_string();
         assert!(error.contains("cannot create the folder"), "{error}");
         assert!(error.contains("file/run.svg"), "{error}");
+    }
+
+    #[test]
+    fn a_folder_without_permission_is_named() {
+        let folder = tempfile::tempdir().unwrap();
+        let mode = |path: &Path, mode| {
+            fs::set_permissions(path, fs::Permissions::from_mode(mode)).unwrap();
+        };
+        mode(folder.path(), 0o755);
+        let closed = folder.path().join("closed");
+        fs::create_dir(&closed).unwrap();
+        mode(&closed, 0);
+        let path = closed.join("run.mcap");
+        let refusal = std::thread::spawn(move || {
+            // Root may open it; this thread is another user's.
+            setfsuid(Uid::from_raw(65534));
+            AtomicFile::create(&path).unwrap_err().to_string()
+        });
+        let expected = format!("cannot open the folder `{}` to write", closed.display());
+        let refusal = refusal.join().unwrap();
+        assert!(refusal.starts_with(&expected), "{refusal}");
+        mode(&closed, 0o700);
     }
 
     #[test]

@@ -29,8 +29,10 @@ pub(crate) enum PlaceError {
     Dangling(PathBuf),
     /// This link belongs to another user.
     Foreign(PathBuf),
-    /// This folder cannot be opened or created.
+    /// This folder cannot be created.
     Folder(PathBuf, io::Error),
+    /// This folder cannot be opened.
+    Closed(PathBuf, io::Error),
 }
 
 /// Where an output file goes.
@@ -119,7 +121,11 @@ impl Walk {
             let path = self.path.join(&name);
             let refuse = |error: Errno| PlaceError::Folder(path.clone(), error.into());
             self.link = (self.link.take()).filter(|(_, after)| self.names.len() >= *after);
-            match self.entry(&name).map_err(refuse)? {
+            let entry = self.entry(&name).map_err(|error| match error {
+                Errno::EACCES => self.closed(error),
+                _ => refuse(error),
+            });
+            match entry? {
                 Entry::Link { target, is_own } => {
                     self.links += 1;
                     if self.links > MOST_LINKS {
@@ -206,7 +212,14 @@ impl Walk {
 
     /// Returns the present folder, opened for reading its names if it may be read.
     fn readable(&self) -> Result<File, PlaceError> {
-        opened(&self.folder).map_err(|error| PlaceError::Folder(self.path.clone(), error.into()))
+        opened(&self.folder).map_err(|error| self.closed(error))
+    }
+
+    /// Returns that the present folder cannot be opened.
+    fn closed(&self, error: Errno) -> PlaceError {
+        let is_start = self.path.as_os_str().is_empty();
+        let path = if is_start { Path::new(".") } else { &self.path };
+        PlaceError::Closed(path.into(), error.into())
     }
 }
 
@@ -220,7 +233,7 @@ fn names_a_folder(path: &Path) -> bool {
 fn start(path: &str) -> Result<OwnedFd, PlaceError> {
     let flags = OFlag::O_PATH | OFlag::O_DIRECTORY | OFlag::O_CLOEXEC;
     openat(AT_FDCWD, path, flags, Mode::empty())
-        .map_err(|error| PlaceError::Folder(path.into(), error.into()))
+        .map_err(|error| PlaceError::Closed(path.into(), error.into()))
 }
 
 fn opened(folder: &impl AsFd) -> Result<File, Errno> {
