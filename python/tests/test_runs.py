@@ -29,10 +29,18 @@ def test_runs_are_compared_from_an_event_on():
     first = painleve.run("edge", SHORT)
     same = painleve.compare(first, first)
     assert len(same) >= 5 and (same["largest"] == 0).all()
-    late = painleve.run("edge", {**SHORT, "run.enable_at_s": 0.1})
-    tip = painleve.compare(first, late).set_index("quantity").loc["tip_mm"]
-    unaligned = painleve.compare(first, late, align="start").set_index("quantity").loc["tip_mm"]
-    assert abs(tip["rms"]) < abs(unaligned["rms"])
+    # The same run enabled 0.1 s late, at rest until then. An arm that is really enabled late starts elsewhere: the belt drags it.
+    wait = 100
+    late = {name: [column[0]] * wait + column for name, column in first.items()}
+    late["time_s"] = [1e-3 * tick for tick in range(len(late["time_s"]))]
+    late["sensor.inputs"][:wait] = [0] * wait
+    aligned = painleve.compare(first, late)
+    assert list(aligned["quantity"]) == list(same["quantity"]) and (aligned["largest"].abs() < 1e-9).all()
+    unaligned = painleve.compare(first, late, align="start").set_index("quantity")
+    assert unaligned.loc["tip_mm", "rms"] > 0.1
+    # A run tells when it was enabled.
+    enabled_s = [painleve.compare(run, run)["at_s"].min() for run in (first, painleve.run("edge", {**SHORT, "run.enable_at_s": 0.1}))]
+    assert enabled_s == pytest.approx([0.0, -0.1])
     with pytest.raises(ValueError, match="align"):
         painleve.compare(first, late, align="end")
 
