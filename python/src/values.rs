@@ -17,7 +17,10 @@ pub fn overrides(values: &Bound<'_, PyDict>) -> PyResult<Vec<String>> {
         let key: String = key
             .extract()
             .map_err(|_| PyTypeError::new_err(format!("override {key}: a key is a text")))?;
-        Ok(format!("{key}={}", text(&toml_value(&key, &value, 0)?)))
+        Ok(format!(
+            "{key}={}",
+            toml_text(&toml_value(&key, &value, 0)?)
+        ))
     });
     entries.collect()
 }
@@ -46,8 +49,9 @@ pub fn arguments(options: &Bound<'_, PyDict>) -> PyResult<Vec<String>> {
                 arguments.push(format!("{option}={}", items.join(",")));
             }
             Value::Table(keys) => {
-                let key =
-                    |(key, value): (&String, &Value)| format!("{option}={key}={}", text(value));
+                let key = |(key, value): (&String, &Value)| {
+                    format!("{option}={key}={}", toml_text(value))
+                };
                 arguments.extend(keys.iter().map(key));
             }
             value => arguments.push(format!("{option}={}", text(&value))),
@@ -69,12 +73,45 @@ pub fn in_python_names(message: &str) -> String {
     renamed
 }
 
-/// Returns a value as it is written after `key=`: a text needs no quotes there.
+/// Returns a value as an option of a command takes it: a text without quotes.
 fn text(value: &Value) -> String {
     match value {
         Value::String(text) => text.clone(),
+        other => toml_text(other),
+    }
+}
+
+/// Returns a value as TOML on one line, where a text remains a text whatever it contains.
+fn toml_text(value: &Value) -> String {
+    match value {
+        Value::String(text) => quoted(text),
+        Value::Array(items) => {
+            let items: Vec<String> = items.iter().map(toml_text).collect();
+            format!("[{}]", items.join(", "))
+        }
+        Value::Table(keys) => {
+            let key =
+                |(key, value): (&String, &Value)| format!("{} = {}", quoted(key), toml_text(value));
+            let keys: Vec<String> = keys.iter().map(key).collect();
+            format!("{{ {} }}", keys.join(", "))
+        }
         other => other.to_string(),
     }
+}
+
+/// Returns a text as a TOML string on one line.
+fn quoted(text: &str) -> String {
+    let mut quoted = String::from('"');
+    for character in text.chars() {
+        match character {
+            '"' | '\\' => quoted.extend(['\\', character]),
+            _ if character.is_control() => {
+                quoted += &format!("\\u{:04x}", u32::from(character));
+            }
+            _ => quoted.push(character),
+        }
+    }
+    quoted + "\""
 }
 
 fn toml_value(key: &str, value: &Bound<'_, PyAny>, level: usize) -> PyResult<Value> {
