@@ -16,6 +16,7 @@ use painleve_shared::counts::{EncoderCounts, ForceCounts, Micrometres, TorqueCou
 use painleve_shared::frame::{ActuatorFrame, DigitalInputs, SensorFrame, StatusFlags};
 use painleve_shared::range::OutOfRange;
 use painleve_study::STUDIES;
+use painleve_study_core::StudyError;
 use painleve_study_core::catalogue::{CatalogueEntry, Progress};
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
@@ -439,7 +440,11 @@ fn study_json(
         .and_then(|matches| (entry.read)(&matches))
         .map_err(|error| mistake(&error))?;
     let study = options.study().map_err(|error| mistake(&error))?;
-    let outcome = study.compute(progress).map_err(|error| exception(&error))?;
+    let outcome = study.compute(progress).map_err(|error| match &error {
+        StudyError::Plant { .. } | StudyError::Loop { .. } => exception(&error),
+        // Some options are checked only with the rows.
+        _ => mistake(&error),
+    })?;
     outcome.json().map_err(|error| exception(&error))
 }
 

@@ -194,6 +194,9 @@ def test_a_study_takes_arrays_and_tuples():
     [
         ("admisible", {}, "unknown study 'admisible': .*admissible"),
         ("bifurcation", {"mu": -1}, "^mu = -1"),
+        ("admissible", {"mu": 99}, "^mu = 99"),
+        ("stiffness", {"v_belt": -200}, "^v_belt = -200"),
+        ("bifurcation", {"v_belt": "-1:-0.1:1e-5", "mu": "0:1:1e-3"}, "rows: at most 10000000"),
         ("admissible", {"nu": 0.6}, "'nu"),
         ("bifurcation", {"v_blt": 0.6}, "'v_blt"),
         ("admissible", {"help": True}, "^help is no option"),

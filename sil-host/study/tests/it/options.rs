@@ -144,6 +144,21 @@ fn keys_that_a_study_without_control_does_not_use_are_refused() {
 }
 
 #[test]
+fn a_value_out_of_range_is_refused_before_the_study_begins() {
+    for (line, option) in [
+        ("admissible --mu 99", "--mu = 99"),
+        ("regions --mu 99", "--mu = 99"),
+        ("bifurcation --mu 99", "--mu = 99"),
+        ("poincare --v-belt=-200", "--v-belt = -200"),
+        ("stiffness --v-belt=-0.4,-200", "--v-belt = -200"),
+    ] {
+        let message = refusal(line);
+        let expected = format!("{option} is outside the allowed range");
+        assert!(message.starts_with(&expected), "{line}: {message}");
+    }
+}
+
+#[test]
 fn an_effect_without_a_contact_that_has_it_is_refused() {
     let line = "effects --effect seam --runs 1 --contact";
     let expected = "--effect seam has no effect here; use --contact compliant";

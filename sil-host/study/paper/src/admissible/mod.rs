@@ -7,7 +7,7 @@ mod outcome;
 mod page;
 
 use painleve_plant::belt_line::{BeltLine, least, positive_stretches};
-use painleve_shared::range;
+use painleve_shared::range::{self, OutOfRange};
 use painleve_shared::{Arm, ArmParameters, Posture, Slip};
 use painleve_study_core::{Study, StudyError};
 use serde::Serialize;
@@ -86,6 +86,11 @@ impl Study for AdmissibleStudy {
     }
 }
 
+/// Checks a friction coefficient.
+fn check_friction(mu: f64) -> Result<(), OutOfRange> {
+    range::check("--mu", mu, 0.0, 10.0)
+}
+
 /// Computes the admissible intervals of an arm at one friction coefficient, in one direction of slip.
 ///
 /// # Errors
@@ -95,7 +100,7 @@ pub fn admissible(
     mu: f64,
     slip: Slip,
 ) -> Result<Admissible, StudyError> {
-    range::check("--mu", mu, 0.0, 10.0)?;
+    check_friction(mu)?;
     let arm = Arm::new(*parameters)?;
     let critical = |posture| {
         let line = BeltLine::new(&arm, posture);

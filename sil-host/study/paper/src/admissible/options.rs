@@ -6,7 +6,7 @@ use painleve_study_core::catalogue::{PageSection, StudyOptions};
 use painleve_study_core::figures::page_maker::PageMaker;
 use painleve_study_core::options::BaseOptions;
 
-use super::{Admissible, AdmissibleStudy, page};
+use super::{Admissible, AdmissibleStudy, check_friction, page};
 
 /// Table II: tip positions at which p > 0, and the critical friction.
 #[derive(Debug, Args)]
@@ -27,10 +27,12 @@ impl StudyOptions for Options {
         let scenario = self
             .base
             .load_rigid(&[("belt.friction", "--mu")], &["arm", "belt"])?;
+        let mu = self.mu.unwrap_or(scenario.belt.friction);
+        check_friction(mu)?;
         Ok(AdmissibleStudy {
             arm: scenario.arm,
             slip: scenario.slip_at_rest(),
-            mu: self.mu.unwrap_or(scenario.belt.friction),
+            mu,
         })
     }
 

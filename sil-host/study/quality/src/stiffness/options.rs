@@ -1,6 +1,7 @@
 //! Options of the study of stiffness.
 
 use clap::Args;
+use painleve_shared::range;
 use painleve_study_core::catalogue::{InShards, StudyOptions, in_shards};
 use painleve_study_core::options::{BaseOptions, seconds};
 use painleve_study_core::{Grid, StudyError};
@@ -46,6 +47,9 @@ impl StudyOptions for Options {
             &[("contact", "--stiffness")],
             &["arm", "belt", "impact", "solver"],
         )?;
+        for &v_belt_m_s in self.v_belt.values() {
+            range::check("--v-belt", v_belt_m_s, -100.0, 100.0)?;
+        }
         let study = Stiffness {
             parameters: scenario.plant_parameters(),
             stiffnesses_n_m: self.stiffness.values().to_vec(),
