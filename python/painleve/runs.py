@@ -13,14 +13,15 @@ from ._painleve import run, study
 
 Run = Mapping[str, Sequence[Any]]
 
-#: What `compare` compares: the name, the column of the simulated arm, the factor to the unit of the name.
+#: What `compare` compares: the name, the column of the simulated arm, what is subtracted, the factor to the unit of the name.
 QUANTITIES = (
-    ("tip_mm", "plant.tip_t_m", 1e3),
-    ("gap_mm", "plant.gap_m", 1e3),
-    ("normal_force_n", "plant.normal_force_n", 1.0),
-    ("u1_nm", "plant.u1_nm", 1.0),
-    ("u2_nm", "plant.u2_nm", 1.0),
-    ("friction", "estimates.friction", 1.0),
+    ("tip_mm", "plant.tip_t_m", None, 1e3),
+    ("error_mm", "plant.tip_t_m", "plant.reference_tip_t_m", 1e3),
+    ("gap_mm", "plant.gap_m", None, 1e3),
+    ("normal_force_n", "plant.normal_force_n", None, 1.0),
+    ("u1_nm", "plant.u1_nm", None, 1.0),
+    ("u2_nm", "plant.u2_nm", None, 1.0),
+    ("friction", "estimates.friction", None, 1.0),
 )
 #: Columns of the panels of `plot`.
 PANELS = (
@@ -87,7 +88,7 @@ def _zero(columns: Run, align: str) -> float:
     for time_s, value in zip(columns["time_s"], columns[column]):
         if int(value) & bit:
             return time_s
-    raise ValueError(f"align = '{align}': this does not happen in a run")
+    raise ValueError(f"align = '{align}': this does not happen in a run; choose another event")
 
 
 def compare(first: Run, *others: Run, align: str = "enable"):
@@ -96,14 +97,18 @@ def compare(first: Run, *others: Run, align: str = "enable"):
     import numpy
     import pandas
 
+    def values(columns, column, minus):
+        values = numpy.asarray(columns[column])
+        return values if minus is None else values - numpy.asarray(columns[minus])
+
     lines = []
     zero = _zero(first, align)
     times = numpy.asarray(first["time_s"]) - zero
     for number, other in enumerate(others, 1):
         other_times = numpy.asarray(other["time_s"]) - _zero(other, align)
-        for name, column, scale in QUANTITIES:
-            values = numpy.interp(times, other_times, other[column], numpy.nan, numpy.nan)
-            difference = scale * (values - numpy.asarray(first[column]))
+        for name, column, minus, scale in QUANTITIES:
+            others_values = numpy.interp(times, other_times, values(other, column, minus), numpy.nan, numpy.nan)
+            difference = scale * (others_values - values(first, column, minus))
             known = numpy.isfinite(difference)
             if known.any():
                 difference, at = difference[known], times[known]
@@ -119,8 +124,9 @@ def compare(first: Run, *others: Run, align: str = "enable"):
     return pandas.DataFrame(lines)
 
 
-def plot(*runs: Run, labels: Sequence[str] = (), align: str = "start"):
-    """Draws runs over time, one above the other in each panel, and returns the Matplotlib figure."""
+def plot(*runs: Run, labels: Sequence[str] = (), align: str = "enable"):
+    """Draws runs over time, one above the other in each panel, and returns the Matplotlib figure. Time is counted from an
+    event, as by `compare`."""
     import matplotlib.pyplot as pyplot
 
     if labels and len(labels) != len(runs):
@@ -137,7 +143,7 @@ def plot(*runs: Run, labels: Sequence[str] = (), align: str = "start"):
                 axis.plot(times, columns[name], style, color=f"C{number}", label=label if which == 0 else None)
     if labels:
         axes[0].legend()
-    axes[-1].set_xlabel("time (s)")
+    axes[-1].set_xlabel(f"time after {align} (s)")
     return figure
 
 

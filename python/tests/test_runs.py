@@ -45,6 +45,28 @@ def test_runs_are_compared_from_an_event_on():
         painleve.compare(first, late, align="end")
 
 
+def test_a_comparison_has_the_quantities_of_the_command():
+    first, second = painleve.run("edge", SHORT), painleve.run("edge", {**SHORT, "belt.friction": 0.5})
+    differences = painleve.compare(first, second).set_index("quantity")
+    assert list(differences.index) == ["tip_mm", "error_mm", "gap_mm", "normal_force_n", "u1_nm", "u2_nm", "friction"]
+    errors_mm = [
+        [1e3 * (tip - reference) for tip, reference in zip(run["plant.tip_t_m"], run["plant.reference_tip_t_m"])]
+        for run in (first, second)
+    ]
+    mean = sum(other - one for one, other in zip(*errors_mm)) / len(errors_mm[0])
+    assert math.isclose(differences.loc["error_mm", "mean"], mean, rel_tol=1e-9)
+
+
+def test_a_plot_counts_time_from_the_event_that_a_comparison_takes():
+    late = painleve.run("edge", {**SHORT, "run.enable_at_s": 0.1})
+    begins = {align: painleve.plot(late, align=align).axes[0].lines[0].get_xdata()[0] for align in ("enable", "start")}
+    begins["default"] = painleve.plot(late).axes[0].lines[0].get_xdata()[0]
+    assert begins == pytest.approx({"enable": -0.1, "start": 0.0, "default": -0.1})
+    never = painleve.run("edge", {**SHORT, "run.enable_at_s": 1.0})
+    with pytest.raises(ValueError, match="align = 'enable': this does not happen in a run; choose another event"):
+        painleve.plot(never)
+
+
 def test_a_plot_has_a_panel_for_each_quantity():
     runs = [painleve.run("edge", {**SHORT, "belt.friction": friction}) for friction in (0.4, 0.6)]
     figure = painleve.plot(*runs, labels=["0.4", "0.6"])
