@@ -53,7 +53,7 @@ def outcome(columns: Run) -> dict[str, float]:
 
 
 def sweep(
-    scenario: str,
+    scenario: str | os.PathLike[str],
     keys: Mapping[str, Iterable[Any]],
     overrides: Mapping[str, Any] | None = None,
     measure: Callable[[Run], Mapping[str, Any]] = outcome,

@@ -18,20 +18,55 @@ use painleve_shared::range::OutOfRange;
 use painleve_study::STUDIES;
 use painleve_study_core::StudyError;
 use painleve_study_core::catalogue::{CatalogueEntry, Progress};
-use pyo3::exceptions::{PyRuntimeError, PyValueError};
+use pyo3::PyClass;
+use pyo3::exceptions::{PyRuntimeError, PyTypeError, PyValueError};
 use pyo3::prelude::*;
-use pyo3::types::PyDict;
+use pyo3::pyclass::boolean_struct::False;
+use pyo3::types::{PyDict, PyString};
 
 mod interruptible;
 mod values;
 
 use interruptible::{Interruptible, exception};
 
-/// Loads a scenario by name, by a path, which ends in `.toml`, or as TOML text, with overrides.
-fn load(scenario: &str, overrides: Option<&Bound<'_, PyDict>>) -> PyResult<Scenario> {
+/// What a scenario is loaded from.
+enum Source {
+    /// The name of a built-in one, a path that ends in `.toml`, or TOML text.
+    Text(String),
+    /// An object with a path, such as one of `pathlib`.
+    Path(String),
+}
+
+impl Default for Source {
+    fn default() -> Self {
+        Self::Text("hybrid-elbow-down".into())
+    }
+}
+
+impl<'py> FromPyObject<'_, 'py> for Source {
+    type Error = PyErr;
+
+    fn extract(object: Borrowed<'_, 'py, PyAny>) -> PyResult<Self> {
+        if let Ok(text) = object.cast::<PyString>() {
+            Ok(Self::Text(text.extract()?))
+        } else if object.hasattr("__fspath__")? {
+            object.call_method0("__fspath__")?.extract().map(Self::Path)
+        } else {
+            Err(PyTypeError::new_err(format!(
+                "a scenario is a name, a path or a TOML text, not of type {}",
+                object.get_type().name()?
+            )))
+        }
+    }
+}
+
+/// Loads a scenario with overrides.
+fn load(source: &Source, overrides: Option<&Bound<'_, PyDict>>) -> PyResult<Scenario> {
     let overrides = overrides.map_or(Ok(Vec::new()), values::overrides)?;
-    let is_path = scenario.ends_with(".toml") && !scenario.contains('\n');
-    let loaded = if scenario.is_empty() || !is_path && scenario.contains(['=', '\n']) {
+    let (Source::Text(scenario) | Source::Path(scenario)) = source;
+    let is_path = matches!(source, Source::Path(_))
+        || scenario.ends_with(".toml") && !scenario.contains('\n');
+    let loaded = if !is_path && (scenario.is_empty() || scenario.contains(['=', '\n'])) {
         Scenario::from_toml(scenario)
             .and_then(|scenario| scenario.with_overrides("scenario", &overrides))
     } else {
@@ -119,13 +154,16 @@ impl Monitor for Columns {
 /// Runs a scenario to its end and returns its quantities as columns: `time_s` and `topic.field`, as
 /// `painleve run --csv` names them. Unknown numbers are NaN.
 #[pyfunction]
-#[pyo3(signature = (scenario = "hybrid-elbow-down", overrides = None))]
+#[pyo3(
+    signature = (scenario = Source::default(), overrides = None),
+    text_signature = "(scenario='hybrid-elbow-down', overrides=None)"
+)]
 fn run<'py>(
     py: Python<'py>,
-    scenario: &str,
+    scenario: Source,
     overrides: Option<&Bound<'py, PyDict>>,
 ) -> PyResult<Bound<'py, PyDict>> {
-    let scenario = load(scenario, overrides)?;
+    let scenario = load(&scenario, overrides)?;
     let columns = py.detach(|| collect(&scenario))?;
     let run = PyDict::new(py);
     run.set_item("time_s", columns.time_s)?;
@@ -204,12 +242,23 @@ fn state<'py>(py: Python<'py>, plant: Snapshot) -> PyResult<Bound<'py, PyDict>> 
     Ok(values)
 }
 
+/// Borrows an object for a call.
+///
+/// # Errors
+/// `RuntimeError` while another call uses it.
+fn idle<'py, T: PyClass<Frozen = False>>(object: &Bound<'py, T>) -> PyResult<PyRefMut<'py, T>> {
+    let name = T::NAME.to_lowercase();
+    object.try_borrow_mut().map_err(|_| {
+        PyRuntimeError::new_err(format!(
+            "another call is using this {name}, perhaps on another thread; give each thread its own"
+        ))
+    })
+}
+
 /// The arm on its belt without converters: torques in N·m, one control tick per step.
-#[pyclass(name = "Plant")]
+#[pyclass(name = "Plant", module = "painleve")]
 struct PyPlant {
     plant: Interruptible,
-    /// Control ticks a second.
-    #[pyo3(get)]
     tick_hz: u32,
     ticks: u64,
 }
@@ -217,9 +266,12 @@ struct PyPlant {
 #[pymethods]
 impl PyPlant {
     #[new]
-    #[pyo3(signature = (scenario = "hybrid-elbow-down", overrides = None))]
-    fn new(scenario: &str, overrides: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
-        let scenario = load(scenario, overrides)?;
+    #[pyo3(
+    signature = (scenario = Source::default(), overrides = None),
+    text_signature = "(scenario='hybrid-elbow-down', overrides=None)"
+)]
+    fn new(scenario: Source, overrides: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
+        let scenario = load(&scenario, overrides)?;
         Ok(Self {
             plant: plant(&scenario)?,
             tick_hz: scenario.run.tick_hz,
@@ -227,32 +279,36 @@ impl PyPlant {
         })
     }
 
+    /// Control ticks a second.
+    #[getter]
+    fn tick_hz(slf: &Bound<'_, Self>) -> PyResult<u32> {
+        Ok(idle(slf)?.tick_hz)
+    }
+
     /// Applies torques u1, u2 in N·m for one tick and returns the state at its end.
-    fn step<'py>(
-        &mut self,
-        py: Python<'py>,
-        u1_nm: f64,
-        u2_nm: f64,
-    ) -> PyResult<Bound<'py, PyDict>> {
+    fn step<'py>(slf: &Bound<'py, Self>, u1_nm: f64, u2_nm: f64) -> PyResult<Bound<'py, PyDict>> {
         let torque_nm = JointTorque::new(u1_nm, u2_nm);
         if !(u1_nm.is_finite() && u2_nm.is_finite()) {
             return Err(PyValueError::new_err(format!(
                 "torques {u1_nm}, {u2_nm} N·m: both are finite numbers"
             )));
         }
-        let until_s = (self.ticks + 1) as f64 / f64::from(self.tick_hz);
-        py.detach(|| {
-            self.plant.command_torque(torque_nm, 0.0);
-            self.plant.advance(until_s, &mut ())
-        })
-        .map_err(|error| exception(&error))?;
-        self.ticks += 1;
-        self.state(py)
+        let mut plant = idle(slf)?;
+        let this = &mut *plant;
+        let until_s = (this.ticks + 1) as f64 / f64::from(this.tick_hz);
+        slf.py()
+            .detach(|| {
+                this.plant.command_torque(torque_nm, 0.0);
+                this.plant.advance(until_s, &mut ())
+            })
+            .map_err(|error| exception(&error))?;
+        this.ticks += 1;
+        state(slf.py(), this.plant.snapshot())
     }
 
     /// The state: `time_s` and the fields of the topic `plant`.
-    fn state<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        state(py, self.plant.snapshot())
+    fn state<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyDict>> {
+        state(slf.py(), idle(slf)?.plant.snapshot())
     }
 }
 
@@ -262,7 +318,7 @@ type Sensor = (u32, u32, u32, u32, i32, i32, u32);
 type Actuator = (u32, u32, i32, i32, i32, i32, u8, u8, u16);
 
 /// The plant with its converters, as the controller sees it.
-#[pyclass(name = "Simulation")]
+#[pyclass(name = "Simulation", module = "painleve")]
 struct PySimulation {
     simulation: Simulation<Interruptible>,
     /// Whether this tick has been sampled.
@@ -272,9 +328,12 @@ struct PySimulation {
 #[pymethods]
 impl PySimulation {
     #[new]
-    #[pyo3(signature = (scenario = "hybrid-elbow-down", overrides = None))]
-    fn new(scenario: &str, overrides: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
-        let scenario = load(scenario, overrides)?;
+    #[pyo3(
+    signature = (scenario = Source::default(), overrides = None),
+    text_signature = "(scenario='hybrid-elbow-down', overrides=None)"
+)]
+    fn new(scenario: Source, overrides: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
+        let scenario = load(&scenario, overrides)?;
         let simulation = Simulation::of(plant(&scenario)?, &scenario);
         Ok(Self {
             simulation: simulation.map_err(out_of_range)?,
@@ -283,16 +342,19 @@ impl PySimulation {
     }
 
     /// Reads the sensors, once a tick: the frame, and whether the link loses it.
-    fn sample(&mut self, py: Python<'_>) -> PyResult<(Sensor, bool)> {
-        if self.is_sampled {
+    fn sample(slf: &Bound<'_, Self>) -> PyResult<(Sensor, bool)> {
+        let mut simulation = idle(slf)?;
+        let this = &mut *simulation;
+        if this.is_sampled {
             return Err(PyRuntimeError::new_err(
                 "advance() comes before the next sample()",
             ));
         }
-        let frame = py
-            .detach(|| self.simulation.sample(&mut ()))
+        let frame = slf
+            .py()
+            .detach(|| this.simulation.sample(&mut ()))
             .map_err(|error| exception(&error))?;
-        self.is_sampled = true;
+        this.is_sampled = true;
         let [joint_1, joint_2] = frame.joints.map(|joint| joint.0);
         let sensor = (
             frame.tick,
@@ -303,13 +365,15 @@ impl PySimulation {
             frame.tangential_force.0,
             frame.inputs.0,
         );
-        Ok((sensor, self.simulation.sensor_frame_is_lost()))
+        Ok((sensor, this.simulation.sensor_frame_is_lost()))
     }
 
     /// Passes the controller's answer, or `None`, to the torque stages and advances to the next tick. An answer to another tick,
     /// or with an unknown state or fault, raises `ValueError`.
     #[pyo3(signature = (answer))]
-    fn advance(&mut self, py: Python<'_>, answer: Option<Actuator>) -> PyResult<()> {
+    fn advance(slf: &Bound<'_, Self>, answer: Option<Actuator>) -> PyResult<()> {
+        let mut simulation = idle(slf)?;
+        let this = &mut *simulation;
         let frame = answer.map(
             |(tick, sequence, u1, u2, reference_um, estimated_um, state, fault, flags)| {
                 ActuatorFrame {
@@ -324,26 +388,27 @@ impl PySimulation {
                 }
             },
         );
-        if !self.is_sampled {
+        if !this.is_sampled {
             return Err(PyRuntimeError::new_err("sample() comes before advance()"));
         }
         if let Some(frame) = &frame {
-            let refused = self.simulation.check_answer(frame);
+            let refused = this.simulation.check_answer(frame);
             refused.map_err(|error| PyValueError::new_err(error.to_string()))?;
         }
-        self.is_sampled = false;
-        py.detach(|| self.simulation.advance(frame.as_ref(), &mut ()))
+        this.is_sampled = false;
+        slf.py()
+            .detach(|| this.simulation.advance(frame.as_ref(), &mut ()))
             .map_err(|error| exception(&error))
     }
 
     /// The state: `time_s` and the fields of the topic `plant`.
-    fn state<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        state(py, self.simulation.plant().snapshot())
+    fn state<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyDict>> {
+        state(slf.py(), idle(slf)?.simulation.plant().snapshot())
     }
 }
 
 /// The firmware's controller.
-#[pyclass(name = "Controller")]
+#[pyclass(name = "Controller", module = "painleve")]
 struct PyController {
     controller: painleve_plant::Controller,
     telemetry: Telemetry,
@@ -352,9 +417,12 @@ struct PyController {
 #[pymethods]
 impl PyController {
     #[new]
-    #[pyo3(signature = (scenario = "hybrid-elbow-down", overrides = None))]
-    fn new(scenario: &str, overrides: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
-        let configuration = load(scenario, overrides)?.controller_configuration();
+    #[pyo3(
+    signature = (scenario = Source::default(), overrides = None),
+    text_signature = "(scenario='hybrid-elbow-down', overrides=None)"
+)]
+    fn new(scenario: Source, overrides: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
+        let configuration = load(&scenario, overrides)?.controller_configuration();
         Ok(Self {
             controller: painleve_plant::Controller::new(&configuration).map_err(out_of_range)?,
             telemetry: Default::default(),
@@ -451,6 +519,7 @@ fn study_json(
 /// The compiled part of the package.
 #[pymodule]
 fn _painleve(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add("__version__", env!("CARGO_PKG_VERSION"))?;
     module.add_function(wrap_pyfunction!(run, module)?)?;
     module.add_function(wrap_pyfunction!(study, module)?)?;
     module.add_class::<PyPlant>()?;

@@ -147,15 +147,28 @@ def stiff_step(plant):
         plant.step(0.0, 0.0)
 
 
-def test_an_object_in_use_on_another_thread_is_a_runtime_error():
-    plant = painleve.Plant("open-loop-bounce", STIFF)
-    with ThreadPoolExecutor(1) as pool:
-        step = pool.submit(stiff_step, plant)
-        time.sleep(0.2)
-        with pytest.raises(RuntimeError, match="borrowed"):
-            plant.state()
-        step.result()
-    assert plant.state()["time_s"] < 0.1
+def stiff_advance(simulation):
+    with pytest.raises(RuntimeError, match="too stiff"):
+        simulation.sample()
+        simulation.advance(None)
+
+
+def test_an_object_in_use_on_another_thread_says_what_to_do():
+    plant, simulation = painleve.Plant("open-loop-bounce", STIFF), painleve.Simulation("open-loop-bounce", STIFF)
+    calls = [
+        (stiff_step, plant, [plant.state, lambda: plant.step(0.0, 0.0), lambda: plant.tick_hz]),
+        (stiff_advance, simulation, [simulation.state, simulation.sample, lambda: simulation.advance(None)]),
+    ]
+    for call, used, others in calls:
+        with ThreadPoolExecutor(1) as pool:
+            step = pool.submit(call, used)
+            time.sleep(0.2)
+            for other in others:
+                name = type(used).__name__.lower()
+                with pytest.raises(RuntimeError, match=f"another call is using this {name}.*; give each thread its own"):
+                    other()
+            step.result()
+        assert used.state()["time_s"] < 0.1
 
 
 def test_other_threads_run_during_a_long_call():

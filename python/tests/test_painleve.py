@@ -1,3 +1,7 @@
+import importlib.metadata
+import inspect
+from pathlib import Path
+
 import numpy
 import painleve
 import pytest
@@ -26,6 +30,19 @@ def test_a_scenario_is_a_name_a_path_or_a_text(tmp_path):
     path = tmp_path / "friction=0.5.toml"
     path.write_text(text)
     assert str(painleve.run(str(path))) == str(painleve.run(text))
+    # An object with a path is never taken for a TOML text.
+    other = tmp_path / "friction=0.5"
+    other.write_text(text)
+    for make in (painleve.run, painleve.Plant, painleve.Simulation, painleve.Controller):
+        make(path)
+        with pytest.raises(ValueError, match=f"no file is called '{tmp_path}/none'"):
+            make(tmp_path / "none")
+        with pytest.raises(TypeError, match="a scenario is a name, a path or a TOML text, not of type int"):
+            make(1)
+        assert inspect.signature(make).parameters["scenario"].default == "hybrid-elbow-down"
+    assert str(painleve.run(path)) == str(painleve.run(other)) == str(painleve.run(text))
+    assert len(painleve.sweep(path, {"belt.friction": [0.4, 0.5]})) == 2
+    assert painleve.study("admissible", scenario=path) == painleve.study("admissible", scenario=str(path))
     defaults = painleve.Plant("").state()
     assert defaults == painleve.Plant("\n").state() != painleve.Plant("open-loop-bounce").state()
 
@@ -33,6 +50,12 @@ def test_a_scenario_is_a_name_a_path_or_a_text(tmp_path):
 def test_the_package_has_the_names_that_it_lists():
     modules = {"gym", "runs", "_painleve"}
     assert {name for name in dir(painleve) if not name.startswith("__")} - modules == set(painleve.__all__)
+
+
+def test_the_package_tells_its_version_and_its_classes_their_module():
+    assert painleve.__version__ == importlib.metadata.version("painleve")
+    for made in (painleve.Plant, painleve.Simulation, painleve.Controller):
+        assert made.__module__ == "painleve"
 
 
 LENGTHS = "arm.link_length_m"
