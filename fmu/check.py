@@ -10,6 +10,7 @@ import pathlib
 import re
 import sys
 import tempfile
+from xml.etree import ElementTree
 
 import calls
 import fmpy
@@ -47,7 +48,18 @@ def main(fmu):
     exec(snippet, {})
 
 
+def check_files(folder):
+    """Every file that a description names is in the archive."""
+    described = folder / "sources/buildDescription.xml"
+    names = [file.get("name") for file in ElementTree.parse(described).iter("SourceFile")] if described.exists() else []
+    missing = [name for name in names if not (folder / "sources" / name).exists()]
+    assert not missing, f"sources/buildDescription.xml names {missing}, which the archive lacks"
+    identifier = fmpy.read_model_description(folder).coSimulation.modelIdentifier
+    assert list((folder / "binaries").glob(f"*/{identifier}.so")), f"no library {identifier}"
+
+
 def check(folder):
+    check_files(pathlib.Path(folder))
     model = {"folder": folder, "description": fmpy.read_model_description(folder)}
     calls.check(pathlib.Path(folder), model["description"])
 
