@@ -244,7 +244,9 @@ def check_initialization(fmu):
         ("belt.profile.speed_m_s is decided by the parameter belt.speed_m_s", "settings", b"belt.profile.speed_m_s=-0.5"),
         ("impact.restitution is decided by", "settings", b"impact={ restitution = 0.2 }"),
         ("initial.theta2_deg is decided by", "settings", b"initial.theta2_deg=18"),
-        ("initial.tip_m is decided by the parameter initial.theta1_deg", "settings", b"initial.tip_m=0.05"),
+        ("initial.theta1_deg is decided by", "settings", b"initial={ theta1_deg = 3.0, theta2_deg = 4.0 }"),
+        ("initial.tip_m = 0.5 is outside the allowed range", "settings", b"initial.tip_m=0.5"),
+        ("initial.elbow: initial.tip_m is missing", "settings", b"initial.elbow=up"),
     ]:
         instance = fmu.in_state("Instantiated")
         assert fmu.set(instance, name, value) == OK and fmu.enter(instance) == OK
@@ -265,6 +267,23 @@ def check_start(fmu):
             assert force_n >= 0.0 and (force_n > 0.0) == (mode != 0), (torque_nm, state, start)
             assert starts.setdefault(torque_nm, start) == start, (torque_nm, state)
             fmu.library.fmi3FreeInstance(instance)
+    # The tip is placed instead of the angles, unless these are given as well.
+    for settings, tip_m, is_up in [
+        (b"initial.tip_m=0.05", 0.05, False),
+        (b"initial.tip_m=-0.1\ninitial.elbow=up", -0.1, True),
+        (b"initial={ tip_m = 0.02, elbow = 'up' }", 0.02, True),
+        (b"arm.height_m=0.39\ninitial.tip_m=0.05", 0.05, False),
+    ]:
+        instance = fmu.in_state("StepMode", settings=settings)
+        start = {name: fmu.get(instance, name)[1] for name in ("tip_t_m", "gap_m", "theta1_rad", "theta2_rad")}
+        assert abs(start["tip_t_m"] - tip_m) < 1e-9 and abs(start["gap_m"]) < 1e-9, (settings, start)
+        assert (start["theta2_rad"] > start["theta1_rad"]) == is_up, (settings, start)
+        fmu.library.fmi3FreeInstance(instance)
+    for name in ("initial.theta1_deg", "initial.theta2_deg"):
+        instance = fmu.in_state("Instantiated", settings=b"initial.tip_m=0.05")
+        assert fmu.set(instance, name, 20.0) == OK and fmu.enter(instance) == OK
+        fmu.refused(f"{name} = 20 has no effect here: initial.tip_m in settings decides", instance, "ExitInitializationMode")
+        fmu.library.fmi3FreeInstance(instance)
     # One torque lifts the tip, the other presses it on the belt, which throws it off.
     assert starts[2.0] != starts[-2.0], "torques set before the start change nothing"
 

@@ -15,15 +15,16 @@ use painleve_shared::JointTorque;
 const SCENARIO: &str = "open-loop-bounce";
 
 /// Keys of a scenario that a parameter decides, which would overwrite them without a word.
-const OWN_PARAMETERS: [(&str, &str); 7] = [
+const OWN_PARAMETERS: [(&str, &str); 5] = [
     ("belt.friction", "belt.friction"),
     ("belt.profile", "belt.speed_m_s"),
     ("impact.restitution", "impact.restitution"),
     ("initial.theta1_deg", "initial.theta1_deg"),
     ("initial.theta2_deg", "initial.theta2_deg"),
-    ("initial.tip_m", "initial.theta1_deg"),
-    ("initial.elbow", "initial.theta1_deg"),
 ];
+
+/// The key that starts the arm with its tip on the belt, instead of the two angles.
+const TIP: &str = "initial.tip_m";
 
 /// Longest communication step, s: some seconds of computation.
 const LONGEST_STEP_S: f64 = 3600.0;
@@ -42,7 +43,7 @@ type Failure = Box<dyn std::error::Error>;
     co_simulation = true
 )]
 struct ArmOnBelt {
-    /// Settings of the plant, one `key=value` per line as after `painleve run --set`; keys of the other parameters are refused
+    /// Settings of the plant, one `key=value` per line as after `painleve run --set`; keys of the other parameters are refused; initial.tip_m decides the start instead of the two angles
     #[variable(name = "settings", causality = Parameter, variability = Fixed, start = String::new(), initial = Exact)]
     settings: String,
     /// Friction coefficient between tip and belt
@@ -143,6 +144,7 @@ impl ArmOnBelt {
                 return Err(format!("settings: {decided}").into());
             }
         }
+        let has_tip = overrides.iter().any(|setting| sets(setting, TIP).is_some());
         // TOML writes nan where Rust writes NaN; the scenario then names the range.
         let number = |value: f64| format!("{value:?}").to_lowercase();
         overrides.extend([
@@ -152,15 +154,45 @@ impl ArmOnBelt {
                 number(self.belt_speed_m_s)
             ),
             format!("impact.restitution={}", number(self.restitution)),
-            format!("initial.theta1_deg={}", number(self.initial_theta1_deg)),
-            format!("initial.theta2_deg={}", number(self.initial_theta2_deg)),
         ]);
+        if has_tip {
+            self.refuse_angles()?;
+        } else {
+            overrides.extend([
+                format!("initial.theta1_deg={}", number(self.initial_theta1_deg)),
+                format!("initial.theta2_deg={}", number(self.initial_theta2_deg)),
+            ]);
+        }
         let scenario = Scenario::load(SCENARIO, &overrides)?;
         let mut plant = BuiltInPlant::new(&scenario)?;
         plant.command_torque(self.torque_nm()?, 0.0);
         // Until it first advances, a plant only guesses the mode of a tip on the belt.
         plant.advance(0.0, &mut ())?;
         Ok(plant)
+    }
+
+    /// Refuses angles that differ from their start values, which nothing would read.
+    fn refuse_angles(&self) -> Result<(), Failure> {
+        let start = Self::at_start();
+        let angles = [
+            (
+                "initial.theta1_deg",
+                self.initial_theta1_deg,
+                start.initial_theta1_deg,
+            ),
+            (
+                "initial.theta2_deg",
+                self.initial_theta2_deg,
+                start.initial_theta2_deg,
+            ),
+        ];
+        match angles.into_iter().find(|(_, angle, start)| angle != start) {
+            Some((name, angle, start)) => Err(format!(
+                "{name} = {angle} has no effect here: {TIP} in settings decides the start; leave {name} = {start}"
+            )
+            .into()),
+            None => Ok(()),
+        }
     }
 
     /// Sets the time at which the simulation starts and the one at which it must have ended, s.
