@@ -189,7 +189,7 @@ def check_variables(fmu):
         fmu.library.fmi3FreeInstance(instance)
     settings = fmu.variables["settings"].valueReference
     instance = fmu.in_state("Instantiated")
-    texts = (c_char_p * 2)(b"run.seed=3", None)
+    texts = (c_char_p * 2)(b"arm.tip_mass_kg=0.001", None)
     fmu.refused("a text is null", instance, "SetString", (c_uint32 * 2)(settings, settings), 2, texts, 2)
     assert fmu.get(instance, "settings") == (OK, b"")
     fmu.library.fmi3FreeInstance(instance)
@@ -240,12 +240,17 @@ def check_initialization(fmu):
         ("initial.theta1_deg = NaN", "initial.theta1_deg", NAN),
         ("u1_nm = NaN", "u1_nm", NAN),
         ("did you mean 'tip_mass_kg'", "settings", b"arm.tip_mas_kg=0.1"),
-        ("belt.friction is decided by the parameter belt.friction", "settings", b"run.seed=3\nbelt.friction = 0.5"),
+        ("belt.friction is decided by the parameter belt.friction", "settings", b"arm.tip_mass_kg=0.001\nbelt.friction = 0.5"),
         ("belt.profile.speed_m_s is decided by the parameter belt.speed_m_s", "settings", b"belt.profile.speed_m_s=-0.5"),
         ("impact.restitution is decided by", "settings", b"impact={ restitution = 0.2 }"),
         ("initial.theta2_deg is decided by", "settings", b"initial.theta2_deg=18"),
         ("initial.theta1_deg is decided by", "settings", b"initial={ theta1_deg = 3.0, theta2_deg = 4.0 }"),
         ("initial.tip_m = 0.5 is outside the allowed range", "settings", b"initial.tip_m=0.5"),
+        ("run.seed has no effect here; set keys of arm, belt, contact,", "settings", b"arm.tip_mass_kg=0.001\nrun.seed=3"),
+        ("controller.governor.enabled has no effect here", "settings", b"controller.governor.enabled=false"),
+        ("converters.force.noise_n has no effect here", "settings", b"converters.force.noise_n=0.1"),
+        ("knowledge.tip_m has no effect here", "settings", b"knowledge.tip_m=0.001"),
+        ("did you mean 'seed'", "settings", b"run.sed=3"),
         ("initial.elbow: initial.tip_m is missing", "settings", b"initial.elbow=up"),
     ]:
         instance = fmu.in_state("Instantiated")
@@ -356,7 +361,7 @@ def check_reset(fmu):
     expected = run(fresh)
     for state in STATES:
         for steps in (0, 1):
-            instance = fmu.in_state(state, belt__friction=0.5, initial__theta2_deg=19.0, u1_nm=0.3, settings=b"run.seed=3")
+            instance = fmu.in_state(state, belt__friction=0.5, initial__theta2_deg=19.0, u1_nm=0.3, settings=b"arm.tip_mass_kg=0.001")
             if state == "StepMode" and steps:
                 assert fmu.step(instance, 0.0, 0.1) == (OK, 0.1)
             assert fmu.call(instance, "Reset") == OK

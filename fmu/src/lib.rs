@@ -7,7 +7,7 @@ mod interface;
 use fmi_export::FmuModel;
 use fmi_export::fmi3::Model;
 use painleve_plant::mechanics::BuiltInPlant;
-use painleve_plant::scenario::{Scenario, sets};
+use painleve_plant::scenario::{Scenario, first_outside, sets};
 use painleve_plant::{Plant, Snapshot};
 use painleve_shared::JointTorque;
 
@@ -21,6 +21,11 @@ const OWN_PARAMETERS: [(&str, &str); 5] = [
     ("impact.restitution", "impact.restitution"),
     ("initial.theta1_deg", "initial.theta1_deg"),
     ("initial.theta2_deg", "initial.theta2_deg"),
+];
+
+/// Tables of a scenario that decide the plant; the others would change nothing.
+const USED: [&str; 7] = [
+    "arm", "belt", "contact", "effects", "impact", "initial", "solver",
 ];
 
 /// The key that starts the arm with its tip on the belt, instead of the two angles.
@@ -143,6 +148,13 @@ impl ArmOnBelt {
                 let decided = format!("{key} is decided by the parameter {parameter}");
                 return Err(format!("settings: {decided}").into());
             }
+        }
+        // A key that is misspelt is called so first.
+        Scenario::load_unplaced(SCENARIO, &overrides)?;
+        if let Some(key) = first_outside(&overrides, &USED) {
+            let used = USED.join(", ");
+            let refused = format!("{key} has no effect here; set keys of {used}");
+            return Err(format!("settings: {refused}").into());
         }
         let has_tip = overrides.iter().any(|setting| sets(setting, TIP).is_some());
         // TOML writes nan where Rust writes NaN; the scenario then names the range.

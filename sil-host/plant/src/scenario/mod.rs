@@ -34,7 +34,7 @@ pub use crate::mechanics::belt::BeltSettings;
 pub use crate::mechanics::{Elbow, InitialState};
 pub use error::ScenarioError;
 pub use knowledge::Knowledge;
-pub use override_key::sets;
+pub use override_key::{first_outside, sets};
 pub use words::{TomlError, known_names};
 
 settings! {

@@ -109,6 +109,20 @@ pub fn sets<'a>(text: &'a str, taken: &'a str) -> Option<&'a str> {
     set.map(|_| taken)
 }
 
+/// Returns the key of the first override that sets nothing in the tables `used`.
+pub fn first_outside<'a>(overrides: &'a [String], used: &[&str]) -> Option<&'a str> {
+    let mut keys = overrides.iter().map(|text| {
+        text.split_once('=')
+            .map_or(text.as_str(), |(key, _)| key)
+            .trim()
+    });
+    keys.find(|key| {
+        !used
+            .iter()
+            .any(|table| key.split('.').next() == Some(table))
+    })
+}
+
 /// Returns the rest of a key that lies inside another.
 fn inside<'a>(key: &'a str, outer: &str) -> Option<&'a str> {
     key.strip_prefix(outer)?.strip_prefix('.')
@@ -134,7 +148,26 @@ fn variant_name(choice: &Value) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::sets;
+    use super::{first_outside, sets};
+
+    #[test]
+    fn an_override_outside_the_used_tables_is_found() {
+        for (text, outside) in [
+            ("arm.height_m=0.36", None),
+            (" arm = { height_m = 0.36 }", None),
+            ("run.seed=3", Some("run.seed")),
+            (" run = { seed = 3 }", Some("run")),
+            ("arm_model.height_m=0.36", Some("arm_model.height_m")),
+            ("armature", Some("armature")),
+        ] {
+            let overrides = ["belt.friction=0.5", text].map(String::from);
+            assert_eq!(
+                first_outside(&overrides, &["arm", "belt"]),
+                outside,
+                "{text}"
+            );
+        }
+    }
 
     #[test]
     fn an_override_sets_its_key_and_what_its_table_contains() {

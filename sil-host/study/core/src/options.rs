@@ -42,14 +42,7 @@ impl BaseOptions {
         if let Some(key) = scenario.effects.first_on(&scenario.arm) {
             return Err(self.ignored(key));
         }
-        let keys = self.overrides.overrides.iter();
-        let mut keys = keys.filter_map(|text| Some(text.split_once('=')?.0.trim()));
-        let is_unused = |key: &&str| {
-            !used
-                .iter()
-                .any(|table| key.split('.').next() == Some(table))
-        };
-        match keys.find(is_unused) {
+        match scenario::first_outside(&self.overrides.overrides, used) {
             Some(key) => Err(StudyError::Taken {
                 key: key.to_owned(),
                 instead: format!("set keys of {}", used.join(", ")),
