@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use crate::command::{ChoreError, cargo, run, run_with, workspace};
-use crate::python;
+use crate::{python, setup};
 
 const ENVIRONMENT: &str = "target/python/fmu";
 const FMPY: &str = "fmpy==0.3.*";
@@ -14,6 +14,8 @@ const FMPY: &str = "fmpy==0.3.*";
 /// # Errors
 /// If a step fails.
 pub fn run_chore() -> Result<(), ChoreError> {
+    // Asked before minutes of compilation.
+    setup::require_virtual_environments()?;
     let fmu = build("target", &[])?;
     let python = python::environment(ENVIRONMENT, &[FMPY])?;
     run(&python, &["fmu/check.py", &fmu.to_string_lossy()])
@@ -22,8 +24,9 @@ pub fn run_chore() -> Result<(), ChoreError> {
 /// Builds the FMU for this computer into a target folder, and returns its path.
 ///
 /// # Errors
-/// If the build fails.
+/// If libclang is missing or the build fails.
 pub fn build(target: &str, environment: &[(&str, &str)]) -> Result<PathBuf, ChoreError> {
+    setup::require_libclang()?;
     // The crate is a workspace of its own; its bundler takes the target folder from the environment.
     let bundle = ["run", "--release", "--locked"];
     let of = ["--manifest-path", "fmu/Cargo.toml"];

@@ -29,7 +29,7 @@ use clap::{Parser, Subcommand};
 
 /// Chores of the painleve workspace.
 #[derive(Debug, Parser)]
-#[command(name = "cargo xtask")]
+#[command(name = "cargo xtask", bin_name = "cargo xtask")]
 struct Xtask {
     #[command(subcommand)]
     chore: Chore,
@@ -93,5 +93,26 @@ fn main() -> ExitCode {
             eprintln!("error: {error}");
             ExitCode::FAILURE
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::CommandFactory;
+
+    #[test]
+    fn usage_is_a_line_that_a_user_can_type() {
+        let usage = |line: &[&str]| {
+            let mut command = super::Xtask::command();
+            let error = command.try_get_matches_from_mut(line).unwrap_err();
+            error.to_string()
+        };
+        let program = "target/verify/painleve-xtask";
+        assert!(usage(&[program, "--help"]).contains("Usage: cargo xtask <COMMAND>"));
+        let of_chore = usage(&[program, "flash"]);
+        assert!(
+            of_chore.contains("Usage: cargo xtask flash <IMAGE>"),
+            "{of_chore}"
+        );
     }
 }

@@ -9,7 +9,7 @@ use std::time::Instant;
 use crate::command::{ChoreError, run, say, workspace};
 use crate::files::unwritable;
 use crate::under_test::{build_program, program};
-use crate::{build_fw, python};
+use crate::{build_fw, python, setup};
 
 const FOLDER: &str = "target/newcomer";
 
@@ -103,6 +103,7 @@ const TASKS: [Task; 10] = [
 /// # Errors
 /// If the wheel has not been built, a task fails, or the first figure takes too long.
 pub fn run_chore() -> Result<(), ChoreError> {
+    setup::require_virtual_environments()?;
     build_fw::run()?;
     build_program()?;
     let user = User::new()?;

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use crate::command::{ChoreError, run, workspace};
+use crate::setup;
 
 const MANIFEST: &str = "python/Cargo.toml";
 const FOLDER: &str = "target/python/package";
@@ -50,6 +51,7 @@ pub fn run_chore() -> Result<(), ChoreError> {
 /// # Errors
 /// If Python lacks `venv`, or a package cannot be installed.
 pub fn environment(folder: &str, packages: &[&str]) -> Result<String, ChoreError> {
+    setup::require_virtual_environments()?;
     run("python3", &["-m", "venv", folder])?;
     let python = format!("{folder}/bin/python");
     let pip = ["-m", "pip", "install", "--quiet"];

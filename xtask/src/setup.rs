@@ -114,8 +114,42 @@ fn missing_further() -> Vec<&'static str> {
     missing
 }
 
+/// Checks that `python3 -m venv` can create environments with pip.
+///
+/// # Errors
+/// The package to install.
+pub fn require_virtual_environments() -> Result<(), ChoreError> {
+    require(
+        has_virtual_environments(),
+        "Python 3 with venv is not installed",
+        "python3-venv",
+    )
+}
+
+/// Checks that the system has libclang, where bindgen looks for it.
+///
+/// # Errors
+/// The package to install.
+pub fn require_libclang() -> Result<(), ChoreError> {
+    require(
+        has_libclang(),
+        "libclang is not installed, or LIBCLANG_PATH does not name its folder",
+        "libclang-dev",
+    )
+}
+
+/// Checks that a tool `is_here`, which a Debian package provides.
+fn require(is_here: bool, otherwise: &str, package: &str) -> Result<(), ChoreError> {
+    if is_here {
+        return Ok(());
+    }
+    Err(ChoreError(format!(
+        "{otherwise}; on Debian install it with `sudo apt-get install {package}`"
+    )))
+}
+
 /// Returns whether `python3 -m venv` can create environments with pip.
-pub fn has_virtual_environments() -> bool {
+fn has_virtual_environments() -> bool {
     let modules = ["-c", "import venv, ensurepip"];
     Command::new("python3")
         .args(modules)
@@ -124,22 +158,27 @@ pub fn has_virtual_environments() -> bool {
         .is_ok_and(|status| status.success())
 }
 
-/// Returns whether the system has libclang, where bindgen looks for it.
-pub fn has_libclang() -> bool {
-    let library = |folder: &Path| {
-        let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
-        let mut names = entries.map(|entry| entry.file_name().to_string_lossy().into_owned());
-        names.any(|name| {
-            name.starts_with("libclang") && name.contains(".so") && !name.contains("cpp")
-        })
+/// Returns whether the system has libclang, where bindgen looks for it: up to two folders deep among the libraries.
+fn has_libclang() -> bool {
+    let is_library = |path: &Path| {
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        name.starts_with("libclang") && name.contains(".so") && !name.contains("cpp")
     };
-    let versions = std::fs::read_dir("/usr/lib")
-        .into_iter()
-        .flatten()
-        .flatten();
-    let mut folders: Vec<PathBuf> = versions.map(|entry| entry.path().join("lib")).collect();
-    folders.extend(["/usr/lib", "/usr/lib64", "/usr/local/lib"].map(PathBuf::from));
-    std::env::var_os("LIBCLANG_PATH").is_some() || folders.iter().any(|folder| library(folder))
+    let inside = |folder: PathBuf| {
+        let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+        entries.map(|entry| entry.path())
+    };
+    let mut places: Vec<PathBuf> = ["/usr/lib", "/usr/lib64", "/usr/local/lib"]
+        .map(PathBuf::from)
+        .into();
+    let further = std::env::var_os("LD_LIBRARY_PATH").unwrap_or_default();
+    places.extend(std::env::split_paths(&further));
+    let mut is_found = std::env::var_os("LIBCLANG_PATH").is_some();
+    for _ in 0..3 {
+        places = places.into_iter().flat_map(inside).collect();
+        is_found = is_found || places.iter().any(|path| is_library(path));
+    }
+    is_found
 }
 
 /// Installs the prebuilt Unicorn from PyPI into an environment under `target/`.
@@ -188,4 +227,19 @@ fn install(packages: &[&str], sudo: bool) -> Result<(), ChoreError> {
     apt(&["update"])?;
     let install = ["install", "-y", "--no-install-recommends"];
     apt(&[&install, packages].concat())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::require;
+
+    #[test]
+    fn a_missing_tool_is_named_with_its_package() {
+        assert!(require(true, "a tool is missing", "a-package").is_ok());
+        let message = require(false, "a tool is missing", "a-package").unwrap_err();
+        assert_eq!(
+            message.to_string(),
+            "a tool is missing; on Debian install it with `sudo apt-get install a-package`"
+        );
+    }
 }
