@@ -424,3 +424,22 @@ fn a_force_beyond_all_measure_latches_a_fault_and_leaves_the_estimates() {
     let turned = controller.estimates.model.theta_rad - before;
     assert!(turned.amax() < 1e-3, "{turned:?}");
 }
+
+/// Joint 1 is turned by hand, forwards through half a turn.
+#[test]
+fn the_friction_of_a_joint_opposes_its_motion_through_half_a_turn() {
+    let mut configuration = configuration();
+    configuration.arm.coulomb_friction_nm = [0.1, 0.0];
+    let [encoder, _] = configuration.converters.encoders;
+    let mut controller = Controller::new(&configuration).unwrap();
+    for tick in 0..400 {
+        let angle_rad = 3.0 + 1e-3 * f64::from(tick);
+        controller.tick(&SensorFrame {
+            joints: [encoder.reading(angle_rad), encoder.reading(0.0)],
+            inputs: DigitalInputs::default(),
+            ..frame(tick)
+        });
+        let friction_nm = controller.estimates.joint_friction.torque_nm().first();
+        assert!(tick < 50 || friction_nm > 0.0, "{tick}: {friction_nm}");
+    }
+}

@@ -19,7 +19,7 @@ pub struct JointFriction {
     /// Compensated Coulomb friction, N·m.
     coulomb_nm: [f32; 2],
     /// Joint angles at the last tick, rad; absent before the first.
-    angles_rad: Option<JointMotion<f32>>,
+    pub(super) angles_rad: Option<JointMotion<f32>>,
     /// Friction, positive against a positive rate, N·m.
     torque_nm: JointTorque<f32>,
 }

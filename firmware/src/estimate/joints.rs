@@ -179,16 +179,17 @@ impl JointEstimator {
     }
 
     /// Leaves out the whole turns by which a joint of an arm without torque has been turned: targets are within half a turn
-    /// of zero.
+    /// of zero. Returns whether there are any.
     #[inline(never)]
-    pub fn unwind(&mut self) {
+    pub fn unwind(&mut self) -> bool {
         let Some(readings) = self.readings else {
-            return;
+            return false;
         };
         let counts = [0, 1].map(|i| self.scales[i].counts_from_zero(readings[i]));
         let turned = [0, 1].map(|i| counts[i].wrapping_sub(self.counts[i]) as f32);
         self.angles_rad += JointMotion::from_array(turned) * self.rad_per_count;
         self.counts = counts;
+        turned != [0.0; 2]
     }
 
     /// Corrects the next readings, which are expected near this pose.

@@ -252,8 +252,9 @@ impl Estimators {
                 .free_acceleration_rad_s2(&command.torque_nm)
                 .to_joints()
                 + command.contact_acceleration_rad_s2;
-        } else {
-            self.joints.unwind();
+        } else if self.joints.unwind() {
+            // No joint has travelled a whole turn.
+            self.joint_friction.angles_rad = None;
         }
         self.joints
             .predict(&command.expected_acceleration_rad_s2, 1);
