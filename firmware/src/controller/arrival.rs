@@ -1,4 +1,4 @@
-//! Classifies an arriving sensor frame and records its lapses.
+//! Checks an arriving sensor frame, records its lapses, and heeds ENABLE in a frame whose readings cannot be used.
 
 use painleve_shared::frame::{DigitalInputs, SensorFrame};
 
@@ -79,6 +79,7 @@ impl<L: Law> Controller<L> {
         if !stale || supervisor.fault().is_some() {
             state.last_sequence = Some(frame.sequence);
         }
+        // The state machine sees only frames with readings.
         let disables = !stale && !frame.inputs.contains(DigitalInputs::ENABLE);
         if disables && elapsed_ticks.is_none() && supervisor.state().drives() {
             supervisor.disable();

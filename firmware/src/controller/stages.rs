@@ -82,7 +82,7 @@ impl<L: Law> Controller<L> {
         let turn = self.turn.take();
         let (estimates, observed) = (&mut self.estimates, &self.observed);
         let touches = estimates.contact.touches;
-        // Compiled for each case: an update in contact, the longest, is none that searches in the air.
+        // Compiled for each case: the longest update, in contact, never coincides with a search in the air.
         if touches {
             estimates.learn(true, observed, turn);
         } else {

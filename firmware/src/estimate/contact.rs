@@ -80,11 +80,11 @@ impl ContactDetector {
     }
 
     /// Updates the decision with one tick's encoder readings: the measured height of the tip above the belt as a part of its
-    /// largest error; half of what the squared distance of the tracking loops' innovations from the steady ones without
-    /// the expected contact force exceeds that from none, counts²; and whether the readings differ from the previous
-    /// ones. Returns whether the tip touches.
-    pub fn update_from_encoders(&mut self, gap: f32, held_counts2: f32, moved: bool) -> bool {
-        let gap = (GAP_SLOPE * (1.0 - gap)).limited(-CERTAIN, GAP_FOR);
+    /// largest error; ½ (|i − r|² − |i|²), counts², with the tracking loops' innovations i and those, r, that they would
+    /// settle at without the expected contact force; and whether the readings differ from the previous ones. Returns
+    /// whether the tip touches.
+    pub fn update_from_encoders(&mut self, gap_ratio: f32, held_counts2: f32, moved: bool) -> bool {
+        let gap = (GAP_SLOPE * (1.0 - gap_ratio)).limited(-CERTAIN, GAP_FOR);
         let release = (held_counts2 / INNOVATION_VARIANCE).limited(-CERTAIN, 0.0);
         // Unchanged readings add no evidence against contact.
         let least = if moved { f32::MIN } else { 0.0 };

@@ -64,7 +64,7 @@ impl DisturbanceEstimator {
     }
 
     /// Updates the estimate of an arm whose `model` includes the present d with the ticks added since the last update.
-    /// In contact, the estimate is slower.
+    /// In contact, the weight falls with p/Q22, to what a loop through the contact may remove in a tick at most.
     #[inline(never)]
     pub fn update(&mut self, model: &Model, contact: &ContactEstimate) {
         let rate_rad_s = model.theta_dot_rad_s;

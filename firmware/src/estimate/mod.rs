@@ -39,7 +39,7 @@ use crate::schedule::Turn;
 
 /// Smallest distance that matters, m. Averages of the encoders' readings do not resolve less, because successive roundings are not
 /// independent; a reference that near has been caught up with.
-pub const RESOLVED_M: f32 = 2e-5;
+pub(crate) const RESOLVED_M: f32 = 2e-5;
 
 /// The contact estimate at a tick, for the posture predicted for it: contact and force from its readings, and in contact
 /// friction and p.
@@ -179,7 +179,7 @@ impl Estimators {
     /// Updates friction, belt and response of the contact with the readings of the last tick, at which the tip `touches` or
     /// not, and what has this turn.
     #[inline(always)]
-    pub fn learn(&mut self, touches: bool, observed: &Observed, turn: Turn) {
+    pub(crate) fn learn(&mut self, touches: bool, observed: &Observed, turn: Turn) {
         let is_informative = self.add_to_balance(observed);
         let is_in_range = self.is_in_range();
         let (model, contact) = (&self.model, &mut self.contact);

@@ -45,7 +45,8 @@ pub struct References {
     posture: Posture,
     /// Whether the edges depend on where a thrown tip may land.
     pub asks_for_landing: bool,
-    /// Whether the program waits for the edges: if it began before, it would have to catch up, and could overtake a slow belt.
+    /// Whether the program waits for contact and the edges: if it began before, it would have to catch up, and could overtake a
+    /// slow belt.
     waits: bool,
     pub(crate) generator: ReferenceGenerator,
 }
@@ -105,6 +106,7 @@ impl References {
             SupervisorState::Armed => self.generator.start(),
             // The reference waits for a tip that is being returned to the belt.
             SupervisorState::LiftOff if recovering => {
+                // As what the program requests, alone: the governor's last place is the reference.
                 TipReference::at_rest(self.generator.next.position_m)
             }
             _ if phase.starts_tracking || self.waits => self.generator.start(),
@@ -155,9 +157,10 @@ impl References {
     /// Prepares the program's reference for the next tick of a drive in this state.
     #[inline]
     pub fn prepare(&mut self, drive: SupervisorState) {
-        self.waits = !(self.generator.has_begun() || self.governor.knows_edges());
+        self.waits = !self.generator.has_begun()
+            && (drive != SupervisorState::Tracking || !self.governor.knows_edges(self.posture));
         let follows = matches!(drive, SupervisorState::Tracking | SupervisorState::LiftOff);
-        // A segment without duration would end, and show a program that has begun.
+        // While it waits, not even a segment of no duration ends.
         if follows && !self.waits {
             self.generator.prepare();
         }

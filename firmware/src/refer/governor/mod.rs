@@ -120,9 +120,9 @@ impl EdgeGovernor {
         self.found && self.searched_for == Some((posture, landing_p_ratio))
     }
 
-    /// Returns whether both edges have been found for the posture that is searched, or are not to be kept.
-    pub fn knows_edges(&self) -> bool {
-        self.found || !self.settings.enabled
+    /// Returns whether both edges of a tip on the belt have been found for this posture, or are not to be kept.
+    pub fn knows_edges(&self, posture: Posture) -> bool {
+        self.has_edges_for(posture, 0.0) || !self.settings.enabled
     }
 
     /// Continues the search for the edges around a tip at `tip_t_m` (m). Where a thrown tip may land,

@@ -145,13 +145,13 @@ impl Encoders {
     }
 }
 
-/// Returns the link angles, rad, that readings of encoders with these known errors (rad) show without a prediction.
-pub fn links_rad(errors: &EncoderCorrection, encoders_rad: [f64; 2]) -> LinkMotion<f64> {
+/// Returns the link angles, rad, that readings of encoders (rad) show with this correction, without a prediction.
+pub fn links_rad(correction: &EncoderCorrection, encoders_rad: [f64; 2]) -> LinkMotion<f64> {
     let encoders = JointMotion::from_array(encoders_rad.map(|angle| angle as f32));
     // As the tracking loops start, and once more: a correction of 10 mrad changes by a thirtieth of the angle's error at most.
-    let mut added_rad = JointMotion::from_array(errors.zero_rad);
+    let mut added_rad = JointMotion::from_array(correction.zero_rad);
     for _ in 0..2 {
-        added_rad = errors.in_pose(&Pose::new(&(encoders + added_rad).to_links()));
+        added_rad = correction.in_pose(&Pose::new(&(encoders + added_rad).to_links()));
     }
     let [one, two] = added_rad.to_array().map(f64::from);
     JointMotion::new(encoders_rad[0] + one, encoders_rad[1] + two).to_links()
