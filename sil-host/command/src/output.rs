@@ -21,10 +21,10 @@ use painleve_record::{McapLog, RecordError, RecordedTick, Recorder, RunPlot, Sin
 use painleve_view::PageFile;
 use serde::{Deserialize, Serialize};
 
-use super::CommandError;
 use super::distinct_files::{self, check_distinct};
 use super::output_error::output;
 use super::system_path::SystemPath;
+use super::{CommandError, UNWRITABLE};
 
 /// The files that a run writes.
 #[derive(Clone, Debug, Args, Serialize, Deserialize)]
@@ -129,6 +129,8 @@ const PROGRESS_TICKS: u64 = 256;
 pub struct Output {
     /// `None` if the run writes no file.
     recorder: Option<Recorder>,
+    /// Whether a file could not be written, which has been reported.
+    has_failed: bool,
     progress: ProgressBar,
     interrupt: Interrupt,
     tick: u64,
@@ -153,6 +155,7 @@ impl Output {
         };
         Ok(Self {
             recorder,
+            has_failed: false,
             progress: progress_bar(scenario.run.ticks()),
             interrupt,
             tick: 0,
@@ -171,25 +174,32 @@ impl Output {
     }
 
     /// Completes the files; without this nothing appears under their names. Returns the paths of those that are complete,
-    /// and why another is not.
+    /// and an error if another is not, which has been reported.
     pub fn finish(self) -> (Vec<String>, Result<(), CommandError>) {
         self.progress.finish_and_clear();
-        self.recorder.map_or((Vec::new(), Ok(())), complete)
+        let (paths, completed) = self.recorder.map_or((Vec::new(), Ok(())), complete);
+        (paths, completed.and(told(self.has_failed)))
     }
 }
 
-/// Completes the files of a recording. Returns the paths of those that are complete, and why another is not; of several,
-/// all but the first are reported.
+/// Completes the files of a recording. Returns the paths of those that are complete, and an error if another is not, which
+/// has been reported.
 pub fn complete(recorder: Recorder) -> (Vec<String>, Result<(), CommandError>) {
     let recorded = recorder.finish();
-    let mut failures = recorded.failures.into_iter();
-    let first = failures.next().map_or(Ok(()), |error| Err(output(error)));
-    failures.for_each(|error| warn(format_args!("error: {error}")));
+    warn_of_failures(&recorded.failures);
     let paths = recorded.complete.iter();
     (
         paths.map(|path| path.display().to_string()).collect(),
-        first,
+        told(!recorded.failures.is_empty()),
     )
+}
+
+/// Returns the error of files that could not be written, which has been reported, if there are any.
+fn told(has_failed: bool) -> Result<(), CommandError> {
+    match has_failed {
+        true => Err(CommandError::Told { code: UNWRITABLE }),
+        false => Ok(()),
+    }
 }
 
 /// Returns where what has been measured of an arm is written by default: that of a rehearsal apart from that of a real arm.
@@ -214,8 +224,12 @@ pub fn keep_partial(recorder: Recorder, reason: &str) {
     for path in recorded.partial {
         warn(format_args!("the partial record is in {}", path.display()));
     }
-    for error in recorded.failures {
-        warn(format_args!("a partial record could not be kept: {error}"));
+    warn_of_failures(&recorded.failures);
+}
+
+fn warn_of_failures(failures: &[RecordError]) {
+    for failure in failures {
+        warn(format_args!("error: {failure}"));
     }
 }
 
@@ -235,9 +249,15 @@ impl Monitor for Output {
     }
 
     fn sample(&mut self, sample: &Sample) -> Result<(), LoopError> {
-        match &mut self.recorder {
-            Some(recorder) => recorder.sample(sample),
-            None => Ok(()),
+        match self.recorder.as_mut().map(|recorder| recorder.push(sample)) {
+            Some(Err(error @ RecordError::Ended)) => Err(LoopError::Monitor(Box::new(error))),
+            Some(Err(failure)) => {
+                // The run goes on, and its report and the other files are complete.
+                warn(format_args!("error: {failure}"));
+                self.has_failed = true;
+                Ok(())
+            }
+            Some(Ok(())) | None => Ok(()),
         }
     }
 

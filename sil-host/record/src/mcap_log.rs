@@ -198,10 +198,15 @@ impl Sink for McapLog {
             name: "ended early".to_owned(),
             metadata: BTreeMap::from([("reason".to_owned(), reason_text.to_owned())]),
         };
+        let noted = self.writer.write_metadata(&metadata);
+        let noted = noted.map_err(|error| RecordError::write(&self.path, reason(error)));
+        let (file, closed) = self.close();
         // What a full disk does not take is left out: `export --recover` reads the rest.
-        let _ = self.writer.write_metadata(&metadata);
-        let (file, _) = self.close();
-        Ok(Some(file.commit_partial()?))
+        let path = file.commit_partial()?;
+        match noted.and(closed) {
+            Ok(()) => Ok(Some(path)),
+            Err(error) => Err(error.but_partly_in(path)),
+        }
     }
 }
 

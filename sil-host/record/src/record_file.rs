@@ -149,9 +149,9 @@ fn records<E: From<Damage>>(
                 bytes_read += read as u64;
             }
             LinearReadEvent::Record { opcode, data } => {
+                // Of a damaged head, what follows may still be read.
                 if opcode == op::HEADER
-                    && let Record::Header(header) =
-                        parse_record(opcode, data).map_err(Damage::from)?
+                    && let Ok(Record::Header(header)) = parse_record(opcode, data)
                     && header.profile == BAG
                 {
                     return Err(Damage::Bag.into());

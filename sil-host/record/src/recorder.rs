@@ -229,7 +229,8 @@ impl Recorder {
     /// Adds a copy of a sample. Waits only when the sinks are behind by several thousand samples.
     ///
     /// # Errors
-    /// [`RecordError`] if writing earlier samples failed. The other sinks go on.
+    /// [`RecordError`] once for every sink that could not write earlier samples. The others go on; after
+    /// [`RecordError::Ended`] there are none.
     #[inline]
     pub fn push(&mut self, sample: &Sample) -> Result<(), RecordError> {
         self.buffer.push(Entry::Tick(*sample));
@@ -288,20 +289,13 @@ impl Recorder {
         let _ = full.send(mem::take(&mut self.buffer));
         drop(full);
         let ended = thread.join();
+        let Files { sinks, failures } = ended.unwrap_or_else(|_| Files {
+            failures: [RecordError::Ended].into(),
+            ..Files::default()
+        });
         let returned = empty.iter().filter_map(|returned| returned.failure);
-        let mut failures: Vec<_> = returned.collect();
-        let sinks = match ended {
-            Ok(files) => {
-                failures.extend(files.failures);
-                files.sinks
-            }
-            Err(_) => {
-                failures.push(RecordError::Ended);
-                Sinks::new()
-            }
-        };
         let recorded = Recorded {
-            failures,
+            failures: returned.chain(failures).collect(),
             ..Recorded::default()
         };
         (sinks, recorded)
@@ -404,7 +398,9 @@ impl Files {
             };
             let partial = self.sinks.remove(index).finish_partial(&error.to_string());
             self.failures.push_back(match partial {
-                Ok(Some(path)) => error.but_partly_in(path),
+                Ok(Some(path)) | Err(RecordError::Partial { path, .. }) => {
+                    error.but_partly_in(path)
+                }
                 // If that cannot be written either, it is for the same reason.
                 Ok(None) | Err(_) => error,
             });

@@ -545,6 +545,21 @@ fn a_file_size_limit_costs_a_run_the_files_that_are_larger() {
         assert!(whole.eq(complete), "{kib} KiB: {files:?}");
         fs::remove_dir_all(bench.path("out")).unwrap_or_default();
     }
+    // Also if a file fails long before the end.
+    let long = bench
+        .shell("ulimit -f 2048; $P run edge --set run.duration_s=12 --no-record --csv out/run.csv");
+    assert_eq!(code(long.status), 4, "{long:?}");
+    assert!(
+        errors(&long).contains("cannot write `out/run.csv`"),
+        "{long:?}"
+    );
+    let report = String::from_utf8_lossy(&long.stdout);
+    assert!(
+        report.contains("log hash") && report.contains("12.00 s"),
+        "{report}"
+    );
+    assert_eq!(bench.files(), ["out/run.html", "out/run.svg"]);
+    fs::remove_dir_all(bench.path("out")).unwrap_or_default();
     // Files of other commands appear together.
     for line in [
         "man manual".to_owned(),
