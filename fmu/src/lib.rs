@@ -48,7 +48,7 @@ type Failure = Box<dyn std::error::Error>;
     co_simulation = true
 )]
 struct ArmOnBelt {
-    /// Settings of the plant, one `key=value` per line as after `painleve run --set`; keys of the other parameters are refused; initial.tip_m decides the start instead of the two angles
+    /// Settings of the plant, one `key=value` per line as after `painleve run --set`; keys of the other parameters, and those that are not of the plant, are refused; initial.tip_m decides the start instead of the two angles
     #[variable(name = "settings", causality = Parameter, variability = Fixed, start = String::new(), initial = Exact)]
     settings: String,
     /// Friction coefficient between tip and belt
@@ -149,7 +149,7 @@ impl ArmOnBelt {
                 return Err(format!("settings: {decided}").into());
             }
         }
-        // A key that is misspelt is called so first.
+        // A misspelt key is reported as misspelt first.
         Scenario::load_unplaced(SCENARIO, &overrides)?;
         if let Some(key) = first_outside(&overrides, &USED) {
             let used = USED.join(", ");

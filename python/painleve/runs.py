@@ -107,8 +107,8 @@ def compare(first: Run, *others: Run, align: str = "enable"):
     for number, other in enumerate(others, 1):
         other_times = numpy.asarray(other["time_s"]) - _zero(other, align)
         for name, column, minus, scale in QUANTITIES:
-            others_values = numpy.interp(times, other_times, values(other, column, minus), numpy.nan, numpy.nan)
-            difference = scale * (others_values - values(first, column, minus))
+            other_values = numpy.interp(times, other_times, values(other, column, minus), numpy.nan, numpy.nan)
+            difference = scale * (other_values - values(first, column, minus))
             known = numpy.isfinite(difference)
             if known.any():
                 difference, at = difference[known], times[known]

@@ -50,7 +50,10 @@ impl<'py> FromPyObject<'_, 'py> for Source {
         if let Ok(text) = object.cast::<PyString>() {
             Ok(Self::Text(text.extract()?))
         } else if object.hasattr("__fspath__")? {
-            object.call_method0("__fspath__")?.extract().map(Self::Path)
+            let path: String = object.call_method0("__fspath__")?.extract()?;
+            // Never the name of a built-in one.
+            let is_name = !path.contains('/');
+            Ok(Self::Path(if is_name { format!("./{path}") } else { path }))
         } else {
             Err(PyTypeError::new_err(format!(
                 "a scenario is a name, a path or a TOML text, not of type {}",
@@ -267,9 +270,9 @@ struct PyPlant {
 impl PyPlant {
     #[new]
     #[pyo3(
-    signature = (scenario = Source::default(), overrides = None),
-    text_signature = "(scenario='hybrid-elbow-down', overrides=None)"
-)]
+        signature = (scenario = Source::default(), overrides = None),
+        text_signature = "(scenario='hybrid-elbow-down', overrides=None)"
+    )]
     fn new(scenario: Source, overrides: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
         let scenario = load(&scenario, overrides)?;
         Ok(Self {
@@ -329,9 +332,9 @@ struct PySimulation {
 impl PySimulation {
     #[new]
     #[pyo3(
-    signature = (scenario = Source::default(), overrides = None),
-    text_signature = "(scenario='hybrid-elbow-down', overrides=None)"
-)]
+        signature = (scenario = Source::default(), overrides = None),
+        text_signature = "(scenario='hybrid-elbow-down', overrides=None)"
+    )]
     fn new(scenario: Source, overrides: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
         let scenario = load(&scenario, overrides)?;
         let simulation = Simulation::of(plant(&scenario)?, &scenario);
@@ -418,9 +421,9 @@ struct PyController {
 impl PyController {
     #[new]
     #[pyo3(
-    signature = (scenario = Source::default(), overrides = None),
-    text_signature = "(scenario='hybrid-elbow-down', overrides=None)"
-)]
+        signature = (scenario = Source::default(), overrides = None),
+        text_signature = "(scenario='hybrid-elbow-down', overrides=None)"
+    )]
     fn new(scenario: Source, overrides: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
         let configuration = load(&scenario, overrides)?.controller_configuration();
         Ok(Self {

@@ -30,7 +30,9 @@ def test_a_scenario_is_a_name_a_path_or_a_text(tmp_path):
     path = tmp_path / "friction=0.5.toml"
     path.write_text(text)
     assert str(painleve.run(str(path))) == str(painleve.run(text))
-    # An object with a path is never taken for a TOML text.
+    # An object with a path is never taken for a TOML text, nor for the name of a built-in scenario.
+    with pytest.raises(ValueError, match="no file is called './edge'"):
+        painleve.run(Path("edge"))
     other = tmp_path / "friction=0.5"
     other.write_text(text)
     for make in (painleve.run, painleve.Plant, painleve.Simulation, painleve.Controller):

@@ -215,7 +215,7 @@ impl Walk {
         opened(&self.folder).map_err(|error| self.closed(error))
     }
 
-    /// Returns that the present folder cannot be opened.
+    /// Returns the error of the present folder, which cannot be opened.
     fn closed(&self, error: Errno) -> PlaceError {
         let is_start = self.path.as_os_str().is_empty();
         let path = if is_start { Path::new(".") } else { &self.path };

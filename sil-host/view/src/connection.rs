@@ -5,7 +5,7 @@
 //! timeouts cannot be set. The server of the Foxglove SDK serves no page, checks neither token nor origin, and needs `tokio`.
 
 use std::io::{self, ErrorKind, Read, Write};
-use std::net::TcpStream;
+use std::net::{Shutdown, TcpStream};
 use std::time::{Duration, Instant};
 
 use tungstenite::Error;
@@ -78,7 +78,13 @@ impl Connection {
              Cache-Control: no-store\r\nX-Frame-Options: DENY\r\nReferrer-Policy: no-referrer\r\n\
              {allow}Connection: close\r\n\r\n{body}"
         );
-        self.write_all(answer.as_bytes())
+        self.write_all(answer.as_bytes())?;
+        if status == StatusCode::METHOD_NOT_ALLOWED {
+            // A body that nobody reads would end the connection before the answer.
+            self.stream.shutdown(Shutdown::Write)?;
+            while self.read(&mut [0; 4096])? > 0 {}
+        }
+        Ok(())
     }
 
     /// The stream, and what has been read of it behind the request.

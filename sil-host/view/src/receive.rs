@@ -58,8 +58,8 @@ fn is_pause(error: &std::io::Error) -> bool {
 }
 
 /// Connections whose end is waited for with patience, and the largest number of them.
-static TURNED_AWAY: AtomicUsize = AtomicUsize::new(0);
-pub(crate) const MOST_TURNED_AWAY: usize = MOST_VIEWERS;
+static CLOSING: AtomicUsize = AtomicUsize::new(0);
+pub(crate) const MOST_CLOSING: usize = MOST_VIEWERS;
 
 /// Closes the connection of one viewer too many, and tells it why.
 pub(crate) fn turn_away(mut socket: WebSocket<TcpStream>) {
@@ -77,7 +77,7 @@ pub(crate) fn turn_away(mut socket: WebSocket<TcpStream>) {
 /// Waits with patience for the end of a connection that is being closed. A crowd is not waited for.
 fn wait(mut is_open: impl FnMut() -> bool) {
     let start = Instant::now();
-    let is_crowd = TURNED_AWAY.fetch_add(1, Ordering::Relaxed) >= MOST_TURNED_AWAY;
+    let is_crowd = CLOSING.fetch_add(1, Ordering::Relaxed) >= MOST_CLOSING;
     while !is_crowd && start.elapsed() < PATIENCE && is_open() {}
-    TURNED_AWAY.fetch_sub(1, Ordering::Relaxed);
+    CLOSING.fetch_sub(1, Ordering::Relaxed);
 }

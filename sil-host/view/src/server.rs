@@ -262,7 +262,7 @@ mod tests {
 
     use super::*;
     use crate::hub::MOST_VIEWERS;
-    use crate::receive::MOST_TURNED_AWAY;
+    use crate::receive::MOST_CLOSING;
     use crate::request::ViewerRequest;
 
     fn server(origins: &[String]) -> Server {
@@ -392,7 +392,8 @@ mod tests {
             "{refused}"
         );
         for method in ["POST", "PUT", "OPTIONS", "DELETE"] {
-            let refused = answer(method, "/", "");
+            let body = format!("Content-Length: 60000\r\n\r\n{}", " ".repeat(60_000));
+            let refused = answer(method, "/", &body);
             assert!(
                 refused.starts_with("HTTP/1.1 405 Method Not Allowed\r\n"),
                 "{refused}"
@@ -547,7 +548,7 @@ mod tests {
         while server.hub.viewers() < MOST_VIEWERS {
             thread::sleep(Duration::from_millis(1));
         }
-        let mut crowd: Vec<_> = (0..2 * MOST_TURNED_AWAY).map(|_| viewer(&server)).collect();
+        let mut crowd: Vec<_> = (0..2 * MOST_CLOSING).map(|_| viewer(&server)).collect();
         thread::sleep(PATIENCE / 4);
         // Not a reader of messages, which would answer.
         let is_closed = |socket: &mut WebSocket<TcpStream>| {
@@ -557,7 +558,7 @@ mod tests {
         };
         let closed = crowd.iter_mut().map(is_closed);
         let closed = closed.filter(|is_closed| *is_closed).count();
-        assert!(closed >= MOST_TURNED_AWAY, "{closed} closed");
+        assert!(closed >= MOST_CLOSING, "{closed} closed");
         drop(viewers);
     }
 

@@ -1,4 +1,4 @@
-//! The options of the chaos. `cargo xtask chaos` contains this file, too, to refuse options before it builds anything.
+//! The options of the chaos test. `cargo xtask chaos` contains this file, too, to refuse options before it builds anything.
 
 use std::ffi::OsString;
 
@@ -33,7 +33,7 @@ pub struct ChaosArguments {
     pub seed: u64,
     /// Instead of sending signals, make the first N calls of each kind fail: no space, a bad disk,
     /// no descriptors, no memory, an interruption. Requires strace.
-    #[arg(long, value_name = "N", default_value_t = 0)]
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = value_parser!(u32).range(..=i64::from(MOST_CALLS)))]
     pub faults: u32,
     /// Seconds within which all processes must have ended after a disturbance. Exceed the
     /// guaranteed 5 s only where other work keeps the machine busy; the limits of silence grow along.
@@ -43,13 +43,13 @@ pub struct ChaosArguments {
     #[arg(long, default_value_t = 4, value_parser = number(256))]
     pub jobs: usize,
     /// Number of additional plants and controllers on the bus of every trial.
-    #[arg(long, default_value_t = 0)]
+    #[arg(long, default_value_t = 0, value_parser = value_parser!(u32).range(..=256))]
     pub crowd: u32,
     /// What runs the controller.
     #[arg(long, value_enum, default_value = "native")]
     pub host: ChaosHost,
     /// So many threads keep the machine busy meanwhile.
-    #[arg(long, default_value_t = 0)]
+    #[arg(long, default_value_t = 0, value_parser = RangedU64ValueParser::<usize>::new().range(..=256))]
     pub load: usize,
 }
 
