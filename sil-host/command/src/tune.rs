@@ -25,13 +25,13 @@ use super::{CommandError, distinct_files};
 pub struct TuneArguments {
     /// Built-in scenario or scenario file to start from.
     scenario: String,
-    /// A key and the range of its values, searched on a logarithmic scale; may be repeated.
+    /// A key with fractional values and their range, searched on a logarithmic scale; may be repeated.
     #[arg(long = "key", value_name = "KEY=FROM:TO", required = true)]
     keys: Vec<Range>,
     /// Override one key, for example belt.friction=0.4; may be repeated.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     overrides: Vec<String>,
-    /// Number of trials.
+    /// Number of trials, 8 to 100000.
     #[arg(long, value_name = "N", default_value_t = 120, value_parser = |text: &str| number(text, 8_u32..=100_000, "a whole number"))]
     trials: u32,
     /// Cases of a trial: other friction, other masses than the controller's model has, other noise.
@@ -106,7 +106,8 @@ fn search(arguments: &TuneArguments) -> Result<(), CommandError> {
     let held_out = [unseen(&tuning.scenario)?, unseen(&tuned)?];
     go_on(&interrupt)?;
     let held_out_cost = held_out[1].cost(&held_out[0]);
-    let is_better = held_out_cost < 1.0 && held_out[1].kept >= held_out[0].kept;
+    let is_better =
+        held_out_cost < held_out[0].cost(&held_out[0]) && held_out[1].kept >= held_out[0].kept;
     let figure = picture::encoded(&arguments.plot, svg(&trials, &given, best)).map_err(output)?;
     commit_all(vec![
         prepare(&arguments.out, tuned.to_brief_toml().as_bytes()).map_err(output)?,

@@ -234,6 +234,14 @@ pub struct LoopResult {
     pub log_hash: String,
 }
 
+impl LoopResult {
+    /// Returns whether the tip was kept on the belt: captured, not lifted off again, and no fault.
+    pub fn is_kept(&self) -> bool {
+        let contact = &self.statistics.contact;
+        contact.captured_s.is_some() && contact.lift_offs == 0 && self.fault.is_none()
+    }
+}
+
 impl<H: ControllerHost, P: Plant> ClosedLoop<H, P> {
     /// Creates a loop at the start of its simulation.
     pub fn new(simulation: Simulation<P>, host: H) -> Self {

@@ -180,9 +180,7 @@ impl RunReport {
             realtime_factor: sim_s / wall_s.max(1e-9),
             lift_offs: statistics.lift_offs,
             first_lift_off_s: statistics.first_lift_off_s,
-            kept: statistics.contact.captured_s.is_some()
-                && statistics.contact.lift_offs == 0
-                && result.fault.is_none(),
+            kept: result.is_kept(),
             impacts: statistics.impacts,
             impacts_without_collision: statistics.impacts_without_collision,
             min_tip_t_m: statistics.min_tip_t_m,

@@ -17,7 +17,7 @@ use painleve_plant::mechanics::BuiltInPlant;
 use painleve_plant::mechanics::motion::theta;
 use painleve_plant::scenario::{InitialState, Scenario};
 use painleve_plant::statistics::Statistics;
-use painleve_shared::{Arm, Posture};
+use painleve_shared::{Arm, Posture, range};
 use painleve_study_core::case::{self, ControllerChoice, ConverterChoice, Reference};
 use painleve_study_core::initial::Initial;
 use painleve_study_core::loop_study::{LoopStudy, MakePlant};
@@ -150,6 +150,9 @@ impl ClosedLoopBifurcation {
         let target_m = self
             .target_m
             .unwrap_or_else(|| printed::target_m(controller, start_posture));
+        // Whole micrometres, for the message.
+        let reach_m = (1e6 * Arm::new(scenario.arm)?.reach_on_belt_m()).floor() / 1e6;
+        range::check("--target-m", target_m, -reach_m, reach_m)?;
         scenario.controller.reference = self.reference.to(target_m);
         let cell = LoopCell {
             controller,

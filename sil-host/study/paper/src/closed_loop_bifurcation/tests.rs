@@ -137,7 +137,7 @@ fn out_of_range_values_are_reported_before_any_cell_runs() {
         ..study(ControllerChoice::Hybrid)
     };
     let error = far.check().unwrap_err().to_string();
-    assert!(error.contains("target_m = 0.5"), "{error}");
+    assert!(error.contains("--target-m = 0.5"), "{error}");
     let fast = ClosedLoopBifurcation {
         v_belt_m_s: vec![1e9],
         ..study(ControllerChoice::Hybrid)
@@ -146,5 +146,21 @@ fn out_of_range_values_are_reported_before_any_cell_runs() {
         fast.check().unwrap_err().to_string().contains("belt."),
         "{:?}",
         fast.check()
+    );
+}
+
+#[test]
+fn a_target_out_of_reach_of_ones_own_arm_is_refused_by_the_option_that_sets_it() {
+    let short = ClosedLoopBifurcation {
+        overrides: vec![
+            "arm.link_length_m=[0.1,0.1]".into(),
+            "arm.height_m=0.15".into(),
+        ],
+        ..study(ControllerChoice::Hybrid)
+    };
+    let error = short.row(0).unwrap_err().to_string();
+    assert!(
+        error.starts_with("--target-m = 0.148 is outside"),
+        "{error}"
     );
 }

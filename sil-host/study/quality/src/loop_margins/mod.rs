@@ -185,12 +185,12 @@ impl LoopMargins {
             .chain(self.overrides.iter().cloned())
             .chain(changes.iter().cloned());
         let overrides: Vec<String> = overrides.collect();
-        let mut scenario = case::scenario(
-            controller,
-            self.posture,
-            ConverterChoice::Hardware,
-            &overrides,
-        )?;
+        let converters = match controller {
+            // Control rate, delays and ranges of somebody's own arm decide its margins.
+            ControllerChoice::Scenario(_) => ConverterChoice::Own,
+            _ => ConverterChoice::Hardware,
+        };
+        let mut scenario = case::scenario(controller, self.posture, converters, &overrides)?;
         // The response of the contact is estimated from what rounding to counts does to the force, which fine converters
         // do not do. With counts, the controller finds this contact rigid.
         if scenario.contact.kind == ContactKind::Rigid {

@@ -106,3 +106,26 @@ fn near_the_edge_no_flight_passes_for_the_loop() {
     let margins = &row.loops[0].margins;
     assert!(margins.modulus > 0.15, "{margins:?}");
 }
+
+#[test]
+fn the_delay_of_ones_own_scenario_is_in_its_loop() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("late.toml");
+    let late = ["converters.torque.delay_ticks=3".to_owned()];
+    let scenario = Scenario::load("hybrid-elbow-down", &late).unwrap();
+    std::fs::write(&path, scenario.to_toml().unwrap()).unwrap();
+    let delay_ms = |study: &LoopMargins| -> f64 {
+        let rows = painleve_study_core::rows(study, || ()).unwrap();
+        rows[0].loops[0].margins.delay_ms.unwrap()
+    };
+    let of_the_file = delay_ms(&study(path.to_str().unwrap(), &[0.05], 0));
+    let given = LoopMargins {
+        overrides: late.to_vec(),
+        ..study("hybrid", &[0.05], 0)
+    };
+    assert!(
+        (of_the_file - delay_ms(&given)).abs() < 0.01,
+        "{of_the_file}"
+    );
+    assert!(of_the_file < 0.9 * delay_ms(&study("hybrid", &[0.05], 0)));
+}

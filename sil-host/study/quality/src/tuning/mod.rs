@@ -218,7 +218,7 @@ fn run(scenario: &Scenario, interrupt: &Interrupt) -> Result<Score, StudyError> 
             .unwrap_or_default()
     };
     let (moving, holding) = (&result.smoothness.moving, &result.smoothness.holding);
-    let is_kept = goes_on && result.statistics.lift_offs == 0 && result.fault.is_none();
+    let is_kept = goes_on && result.is_kept();
     Ok(Score {
         kept: f64::from(u8::from(is_kept)),
         error_mm: 1e3 * (errors.squares_m2 / errors.ticks.max(1) as f64).sqrt(),

@@ -138,3 +138,12 @@ fn a_range_that_is_none_is_refused() {
     let error = unknown.check().unwrap_err().to_string();
     assert!(error.contains("did you mean 'friction'?"), "{error}");
 }
+
+/// On a compliant belt, a tip set down without pressing bounces once before it is captured.
+#[test]
+fn a_tip_that_bounces_before_it_is_captured_is_kept() {
+    let overrides = ["run.duration_s=1.6", "contact.kind=compliant"];
+    let scenario = Scenario::load("edge", &overrides.map(str::to_owned)).unwrap();
+    let score = tuning().score(&scenario, 2, 7).unwrap();
+    assert_eq!(score.kept, 1.0);
+}
