@@ -267,7 +267,7 @@ fn mistakes_are_reported_in_one_line_and_overwrite_nothing() {
         ),
         (
             &["closed-loop-bifurcation", "--target-m", "0.5"],
-            &["target_m = 0.5"],
+            &["--target-m = 0.5 is outside the allowed range -0.184102 to 0.184102"],
         ),
         (
             &["sliding-range", "--posture", "elbow-left"],
