@@ -172,7 +172,7 @@ pub static CHIPS: [Chip; 2] = [
         timer_hz: 84e6,
         oscillator_hz: [17e3, 47e3],
         tick_cycles: 8000,
-        usual_tick_cycles: 3872,
+        usual_tick_cycles: 3778,
         release_cycles: 1680,
         // A sector of 128 KiB: up to 4 s at any width of a store.
         store_s: 4.5,
@@ -231,7 +231,7 @@ pub static CHIPS: [Chip; 2] = [
         timer_hz: 170e6,
         oscillator_hz: [29.5e3, 34e3],
         tick_cycles: 17_300,
-        usual_tick_cycles: 3868,
+        usual_tick_cycles: 3770,
         release_cycles: 2550,
         store_s: 0.2,
         // 400 bytes, in double words of 8 that take 82 µs each.
