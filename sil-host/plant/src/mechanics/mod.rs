@@ -41,5 +41,5 @@ pub use arm_on_belt::ArmOnBelt;
 pub use built_in::BuiltInPlant;
 pub(crate) use from_file::{with_paths_only, without_files};
 pub use motion_error::MotionError;
-pub use parameters::{Elbow, InitialState, PlantParameters, SolverSettings};
+pub use parameters::{Elbow, InitialState, PlantParameters, SolverSettings, printed_reach_m};
 pub use probe::{ArmProbe, ArmStep};

@@ -112,6 +112,11 @@ impl From<Elbow> for Posture {
     }
 }
 
+/// Returns how far along the belt an arm reaches in whole micrometres, as messages give it, m.
+pub fn printed_reach_m(arm: &Arm<f64>) -> f64 {
+    (1e6 * arm.reach_on_belt_m()).floor() / 1e6
+}
+
 impl InitialState {
     /// θ1 and θ2 of the paper's x0,d, degrees.
     pub const X0_D_DEG: [f64; 2] = [-11.4, -35.1];
@@ -133,8 +138,7 @@ impl InitialState {
         let [theta_1, theta_2] = match self.tip_m {
             Some(tip_m) => {
                 let arm = Arm::new(*arm)?;
-                // Whole micrometres, for the message.
-                let reach_m = (1e6 * arm.reach_on_belt_m()).floor() / 1e6;
+                let reach_m = printed_reach_m(&arm);
                 let unreachable = OutOfRange {
                     value: tip_m,
                     minimum: -reach_m,

@@ -15,6 +15,7 @@ use std::collections::BTreeMap;
 use painleve_plant::State;
 use painleve_plant::mechanics::BuiltInPlant;
 use painleve_plant::mechanics::motion::theta;
+use painleve_plant::mechanics::printed_reach_m;
 use painleve_plant::scenario::{InitialState, Scenario};
 use painleve_plant::statistics::Statistics;
 use painleve_shared::{Arm, Posture, range};
@@ -150,8 +151,7 @@ impl ClosedLoopBifurcation {
         let target_m = self
             .target_m
             .unwrap_or_else(|| printed::target_m(controller, start_posture));
-        // Whole micrometres, for the message.
-        let reach_m = (1e6 * Arm::new(scenario.arm)?.reach_on_belt_m()).floor() / 1e6;
+        let reach_m = printed_reach_m(&Arm::new(scenario.arm)?);
         range::check("--target-m", target_m, -reach_m, reach_m)?;
         scenario.controller.reference = self.reference.to(target_m);
         let cell = LoopCell {
