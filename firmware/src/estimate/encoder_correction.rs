@@ -50,17 +50,14 @@ mod tests {
     use crate::estimate::joints::{JointEstimator, JointEstimatorSettings};
     use painleve_shared::counts::EncoderScale;
     use painleve_shared::{JointTorque, LinkMotion};
+    use proptest::array::uniform2;
     use proptest::prelude::*;
-
-    fn pair(limit: f32) -> impl Strategy<Value = [f32; 2]> {
-        [-limit..limit, -limit..limit]
-    }
 
     proptest! {
         #[test]
         fn a_correction_is_its_constant_and_two_harmonics_of_the_joints_angle(
-            zero_rad in pair(0.1), sine_rad in pair(0.02), cosine_rad in pair(0.02),
-            second_sine_rad in pair(0.01), second_cosine_rad in pair(0.01),
+            zero_rad in uniform2(-0.1_f32..0.1), sine_rad in uniform2(-0.02_f32..0.02), cosine_rad in uniform2(-0.02_f32..0.02),
+            second_sine_rad in uniform2(-0.01_f32..0.01), second_cosine_rad in uniform2(-0.01_f32..0.01),
             first in -1.5_f32..1.5, elbow in -3.0_f32..3.0,
         ) {
             let encoders = EncoderCorrection {

@@ -160,29 +160,26 @@ pub fn links_rad(correction: &EncoderCorrection, encoders_rad: [f64; 2]) -> Link
 #[cfg(test)]
 mod tests {
     use super::*;
+    use proptest::array::uniform2;
     use proptest::prelude::*;
 
     fn encoders(settings: &EncoderSettings, theta_rad: &LinkMotion<f64>) -> Encoders {
         Encoders::new(settings, &ChannelFaults::default(), 1e-3, 1, theta_rad)
     }
 
-    fn pair(limit: f32) -> impl Strategy<Value = [f32; 2]> {
-        [-limit..limit, -limit..limit]
-    }
-
     proptest! {
         #[test]
         fn readings_with_known_errors_show_the_links(
-            zero_rad in pair(0.1), sine_rad in pair(0.02), cosine_rad in pair(0.02),
-            second_sine_rad in pair(0.01), second_cosine_rad in pair(0.01),
+            zero_rad in uniform2(-0.1_f32..0.1), sine_rad in uniform2(-0.02_f32..0.02), cosine_rad in uniform2(-0.02_f32..0.02),
+            second_sine_rad in uniform2(-0.01_f32..0.01), second_cosine_rad in uniform2(-0.01_f32..0.01),
             first in -1.5_f32..1.5, elbow in -3.0_f32..3.0,
         ) {
-            let errors = EncoderCorrection {
+            let correction = EncoderCorrection {
                 zero_rad, sine_rad, cosine_rad, second_sine_rad, second_cosine_rad,
             };
-            let added = errors.in_pose(&Pose::new(&LinkMotion::new(first, first + elbow)));
+            let added = correction.in_pose(&Pose::new(&LinkMotion::new(first, first + elbow)));
             let added = added.to_array();
-            let found = links_rad(&errors, [first - added[0], elbow - added[1]].map(f64::from));
+            let found = links_rad(&correction, [first - added[0], elbow - added[1]].map(f64::from));
             prop_assert!((found.to_joints().first() - f64::from(first)).abs() < 2e-4);
             prop_assert!((found.to_joints().second() - f64::from(elbow)).abs() < 2e-4);
         }
