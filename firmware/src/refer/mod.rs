@@ -106,7 +106,7 @@ impl References {
             SupervisorState::Armed => self.generator.start(),
             // The reference waits for a tip that is being returned to the belt.
             SupervisorState::LiftOff if recovering => {
-                // As what the program requests, alone: the governor's last place is the reference.
+                // Only told as what the program requests: the reference stays where the governor last had it.
                 TipReference::at_rest(self.generator.next.position_m)
             }
             _ if phase.starts_tracking || self.waits => self.generator.start(),

@@ -253,7 +253,7 @@ impl Monitor for Output {
             Some(Err(error @ RecordError::Ended)) => Err(LoopError::Monitor(Box::new(error))),
             Some(Err(failure)) => {
                 // The run goes on, and its report and the other files are complete.
-                warn(format_args!("error: {failure}"));
+                warn_of_failures(&[failure]);
                 self.has_failed = true;
                 Ok(())
             }
