@@ -6,6 +6,7 @@ use painleve_shared::frame::{ActuatorFrame, SensorFrame, StatusFlags};
 use painleve_shared::status::Fault;
 use xxhash_rust::xxh3::Xxh3;
 
+use crate::contact_probe::{CAPTURE_S, ContactProbe};
 use crate::controller_host::{Answer, ControllerHost, HostError};
 use crate::mechanics::BuiltInPlant;
 use crate::plant::{Event, Plant, PlantError, Probe, State, Step};
@@ -235,7 +236,7 @@ pub struct LoopResult {
 }
 
 impl LoopResult {
-    /// Returns whether the tip was kept on the belt: captured, not lifted off again, and no fault.
+    /// Returns whether the tip was kept on the belt: captured since ENABLE, not lifted off again, and no fault.
     pub fn is_kept(&self) -> bool {
         let contact = &self.statistics.contact;
         contact.captured_s.is_some() && contact.lift_offs == 0 && self.fault.is_none()
@@ -246,10 +247,13 @@ impl<H: ControllerHost, P: Plant> ClosedLoop<H, P> {
     /// Creates a loop at the start of its simulation.
     pub fn new(simulation: Simulation<P>, host: H) -> Self {
         let smoothness = Smoothness::new(simulation.tick_hz());
+        let mut statistics = Statistics::new(SETTLING_S);
+        // What touches before the drive is on, no controller has captured.
+        statistics.contact = ContactProbe::new(simulation.enable_at_s(), CAPTURE_S);
         Self {
             simulation,
             host,
-            statistics: Statistics::new(SETTLING_S),
+            statistics,
             smoothness,
             log: LogHash::new(),
             // Three significant digits, as everywhere. It grows with the longest round trip, because to clear the

@@ -150,6 +150,11 @@ impl<P: Plant> Simulation<P> {
         self.clock.tick_hz()
     }
 
+    /// Returns the time at which ENABLE rises, s.
+    pub fn enable_at_s(&self) -> f64 {
+        self.enable_at_s
+    }
+
     /// Returns the number of ticks since the start.
     pub fn ticks(&self) -> u64 {
         self.clock.tick()

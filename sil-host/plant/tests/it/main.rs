@@ -31,3 +31,12 @@ fn run(scenario: &str, overrides: &[&str]) -> LoopResult {
     }
     closed_loop.finish().0
 }
+
+/// With the drive off the arm falls on the belt and slides along it, to where a torque throws it off.
+#[test]
+fn a_contact_before_the_drive_is_on_is_no_capture() {
+    let belt = ["belt.friction=0.57", "belt.profile.speed_m_s=-0.288"];
+    let contact = run("capture", &belt).statistics.contact;
+    let captured_s = contact.captured_s.expect("a capture");
+    assert!(captured_s >= 1.5 && contact.lift_offs == 0, "{contact:?}");
+}
