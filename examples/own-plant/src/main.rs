@@ -79,7 +79,10 @@ fn main() -> Result<(), Box<dyn Error>> {
         closed_loop.tick(&mut ())?;
     }
     let (result, _) = closed_loop.finish();
-    let (tip_m, reference_m) = (result.final_tip_t_m, result.final_reference_m);
+    let tip_m = result.final_tip_t_m;
+    let reference_m = result
+        .final_reference_m
+        .ok_or("the controller follows no reference")?;
     println!("tip at {tip_m:.4} m, reference {reference_m:.4} m");
     if (tip_m - reference_m).abs() > 1e-3 {
         return Err("the tip is more than 1 mm from its reference".into());

@@ -142,7 +142,7 @@ fn simulate(
             let (result, host, wall) = drive(scenario, simulation, paced, output)?;
             host.end.end()?;
             RunReport {
-                wake_up_us: Some(DurationPercentiles::of_ns(&host.lateness_ns)),
+                wake_up_us: DurationPercentiles::of_ns(&host.lateness_ns),
                 missed_deadlines: Some(host.missed_deadlines),
                 ..RunReport::new(scenario, name, pacing.name(), &result, wall)
             }

@@ -10,7 +10,7 @@ use crate::contact_probe::{CAPTURE_S, ContactProbe};
 use crate::controller_host::{Answer, ControllerHost, HostError};
 use crate::mechanics::BuiltInPlant;
 use crate::plant::{Event, Plant, PlantError, Probe, State, Step};
-use crate::sample::Sample;
+use crate::sample::{Sample, reference_tip_t_m};
 use crate::simulation::Simulation;
 use crate::smoothness::Smoothness;
 use crate::statistics::Statistics;
@@ -217,8 +217,8 @@ pub struct LoopResult {
     pub final_theta_rad: LinkMotion<f64>,
     /// p at the end, 1/kg.
     pub final_p_per_kg: f64,
-    /// Reference at the end, m.
-    pub final_reference_m: f64,
+    /// Reference at the end, m; `None` if the controller follows none then, as after a fault or without an answer.
+    pub final_reference_m: Option<f64>,
     /// Whether an edge holds the reference back at the end.
     pub at_edge: bool,
     /// Ticks on which the controller limited its torque.
@@ -346,7 +346,8 @@ impl<H: ControllerHost, P: Plant> ClosedLoop<H, P> {
             final_tip_t_m: last.tip_t_m,
             final_theta_rad: last.theta_rad,
             final_p_per_kg: last.p_per_kg,
-            final_reference_m: self.last_answer.reference_tip.to_metres(),
+            final_reference_m: Some(reference_tip_t_m(&self.last_answer))
+                .filter(|it| it.is_finite()),
             at_edge: self.last_answer.flags.contains(StatusFlags::AT_EDGE),
             saturated_ticks: self.saturated_ticks,
             stale_ticks: self.stale_ticks,
@@ -416,6 +417,7 @@ mod tests {
             closed_loop.tick(&mut ()).unwrap();
             let (result, _) = closed_loop.finish();
             assert_eq!(result.stale_ticks, stale_ticks);
+            assert_eq!(result.final_reference_m, None);
             assert!(result.round_trips_ns.is_empty());
         }
     }

@@ -27,15 +27,15 @@ pub struct DurationPercentiles {
 }
 
 impl DurationPercentiles {
-    /// Returns the percentiles of a histogram of nanoseconds.
-    pub fn of_ns(histogram: &Histogram<u64>) -> Self {
+    /// Returns the percentiles of a histogram of nanoseconds; `None` if it is empty.
+    pub fn of_ns(histogram: &Histogram<u64>) -> Option<Self> {
         let at = |quantile| histogram.value_at_quantile(quantile) as f64 / 1e3;
-        Self {
+        (!histogram.is_empty()).then(|| Self {
             p50: at(0.5),
             p99: at(0.99),
             p999: at(0.999),
             max: histogram.max() as f64 / 1e3,
-        }
+        })
     }
 }
 
@@ -76,8 +76,8 @@ pub struct RunReport {
     pub max_tip_t_m: f64,
     /// Tip position at the end, m.
     pub final_tip_t_m: f64,
-    /// Reference at the end, m.
-    pub final_reference_m: f64,
+    /// Reference at the end, m; null if the controller follows none then.
+    pub final_reference_m: Option<f64>,
     /// End of the reference that the scenario requests, before any edge holds it back, m; null if it
     /// requests none.
     #[serde(default)]
@@ -85,9 +85,9 @@ pub struct RunReport {
     /// Whether the governor holds the reference back at the end.
     #[serde(default)]
     pub at_edge: bool,
-    /// Distance of the tip from the governed reference at the end, m.
+    /// Distance of the tip from the governed reference at the end, m; null without one.
     #[serde(default)]
-    pub error_m: f64,
+    pub error_m: Option<f64>,
     /// Distance of the tip at the end from the place with p = 0 towards the request, m; null unless such an edge, and not
     /// the end of the reach or another limit of the governor, holds the reference back.
     #[serde(default)]
@@ -125,8 +125,8 @@ pub struct RunReport {
     pub saturated_ticks: u64,
     /// Number of ticks whose answer did not arrive in time.
     pub stale_ticks: u64,
-    /// Time from sensor frame to answer, µs.
-    pub round_trip_us: DurationPercentiles,
+    /// Time from sensor frame to answer, µs; null without any answer.
+    pub round_trip_us: Option<DurationPercentiles>,
     /// Hash of all sensor and actuator frames in order.
     pub log_hash: String,
     /// Seed of all noise generators.
@@ -164,6 +164,8 @@ impl RunReport {
         let force = statistics.min_normal_force_n;
         let smoothness = &result.smoothness;
         let converters = &scenario.converters;
+        let has_law = scenario.controller.law.name() != "off";
+        let final_reference_m = result.final_reference_m.filter(|_| has_law);
         let distance_for_knowledge_m = if result.at_edge {
             distance_for_knowledge_m(scenario)
         } else {
@@ -186,12 +188,11 @@ impl RunReport {
             min_tip_t_m: statistics.min_tip_t_m,
             max_tip_t_m: statistics.max_tip_t_m,
             final_tip_t_m: result.final_tip_t_m,
-            final_reference_m: result.final_reference_m,
-            requested_target_m: scenario
-                .target_m()
-                .filter(|_| scenario.controller.law.name() != "off"),
+            final_reference_m,
+            requested_target_m: scenario.target_m().filter(|_| has_law),
             at_edge: result.at_edge,
-            error_m: (result.final_tip_t_m - result.final_reference_m).abs(),
+            error_m: final_reference_m
+                .map(|reference_m| (result.final_tip_t_m - reference_m).abs()),
             to_edge_m: to_edge_m(scenario, result),
             distance_for_knowledge_m,
             kept_p_per_kg: kept_p_per_kg(scenario, result),
@@ -259,18 +260,21 @@ impl RunReport {
             "time in contact",
             format!("{:.2} %", 100.0 * self.contact_fraction),
         );
+        let reference = self.final_reference_m.map_or("–".into(), |reference_m| {
+            format!("{:+.2} mm", 1e3 * reference_m)
+        });
         row(
             "tip at the end",
-            format!(
-                "{:+.2} mm, reference {:+.2} mm",
-                1e3 * self.final_tip_t_m,
-                1e3 * self.final_reference_m
-            ),
+            format!("{:+.2} mm, reference {reference}", 1e3 * self.final_tip_t_m),
         );
+        let short_m = |target_m: f64| {
+            let reference_m = self.final_reference_m;
+            reference_m.map_or(f64::INFINITY, |reference_m| (target_m - reference_m).abs())
+        };
         // Held back by an edge, or not yet reached.
-        let is_short = |target_m: &f64| (target_m - self.final_reference_m).abs() > TOLD_M;
+        let is_short = |target_m: &f64| short_m(*target_m) > TOLD_M;
         if let Some(target_m) = self.requested_target_m.filter(is_short) {
-            let short_mm = 1e3 * (target_m - self.final_reference_m).abs();
+            let short_mm = 1e3 * short_m(target_m);
             let known_mm = 1e3 * self.distance_for_knowledge_m;
             let held = format!("; held {short_mm:.1} mm short");
             let why = if !self.at_edge {
@@ -328,7 +332,8 @@ impl RunReport {
                 self.ticks, self.saturated_ticks, self.stale_ticks
             ),
         );
-        row("round trip", microseconds(&self.round_trip_us));
+        let round_trip = self.round_trip_us.as_ref();
+        row("round trip", round_trip.map_or("–".into(), microseconds));
         if let Some(wake_up) = &self.wake_up_us {
             row("wake-up lateness", microseconds(wake_up));
         }
@@ -374,7 +379,7 @@ fn to_edge_m(scenario: &Scenario, result: &LoopResult) -> Option<f64> {
     if !result.at_edge {
         return None;
     }
-    let direction = scenario.target_m()? - result.final_reference_m;
+    let direction = scenario.target_m()? - result.final_reference_m?;
     ParadoxDistance::new(scenario).ok()?.before_edge_m(
         &result.final_theta_rad,
         result.final_p_per_kg,

@@ -51,6 +51,29 @@ fn the_elbow_up_run_slides_to_its_limit_too() {
     );
 }
 
+/// Zero would be a place on the belt, and a time.
+#[test]
+fn a_run_without_an_answer_has_no_reference_and_no_round_trip() {
+    let bench = Bench::new("unanswered");
+    let short = ["--set", "run.duration_s=0.1"];
+    let lost = ["--set", "converters.link.frame_loss=1"];
+    let edge = [&["run", "edge"], &QUIET[..], &short, &lost].concat();
+    let report = bench.report(&[&edge[..], &["--json"]].concat());
+    for key in ["final_reference_m", "error_m", "round_trip_us"] {
+        assert_eq!(report[key], Value::Null, "{report}");
+    }
+    // The law `off` follows no reference, whatever its supervisor says.
+    let off = [&["run", "open-loop-bounce", "--json"], &QUIET[..], &short].concat();
+    let off = bench.report(&off);
+    assert_eq!(off["final_reference_m"], Value::Null, "{off}");
+    assert!(off["round_trip_us"].is_object(), "{off}");
+    let table = bench.run(&edge).stdout;
+    let table = String::from_utf8_lossy(&table);
+    assert!(table.contains("mm, reference –"), "{table}");
+    let row = table.lines().find(|line| line.contains("round trip"));
+    assert!(row.is_some_and(|row| row.contains("┆ – ")), "{table}");
+}
+
 #[test]
 fn a_run_fails_on_the_requested_events_only() {
     let bench = Bench::new("fail-on");

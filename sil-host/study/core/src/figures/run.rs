@@ -27,10 +27,13 @@ pub fn section(scenario: &Scenario, result: &LoopResult, svg: String) -> Section
     let contact = paper.map(|(paper, agrees)| Comparison::new("contact", paper, here, agrees));
     let end = Comparison::beyond(
         "tip at the end",
-        format!(
-            "{:.4} m, reference {:.4} m",
-            result.final_tip_t_m, result.final_reference_m
-        ),
+        match result.final_reference_m {
+            Some(reference_m) => format!(
+                "{:.4} m, reference {reference_m:.4} m",
+                result.final_tip_t_m
+            ),
+            None => format!("{:.4} m", result.final_tip_t_m),
+        },
     );
     Section {
         title: format!("Simulation: {}", scenario.name),
