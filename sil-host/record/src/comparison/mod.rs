@@ -185,9 +185,9 @@ impl Difference {
         [
             self.run.clone(),
             quantity.map_or_else(String::new, Quantity::label),
-            decimals(self.mean, 3),
-            decimals(self.rms, 3),
-            decimals(self.largest, 3),
+            three_digits(self.mean),
+            three_digits(self.rms),
+            three_digits(self.largest),
             decimals(self.at_s, 3),
         ]
     }
@@ -202,8 +202,8 @@ impl Outcome {
         "lift-offs after it",
         "first, s",
         "fault",
-        "final tip, mm",
-        "final error, mm",
+        "tip at the last tick, mm",
+        "error there, mm",
     ];
 
     /// Returns the outcome as a table shows it.
@@ -230,7 +230,7 @@ impl Outcome {
                 fault => fault.to_string(),
             },
             number(self.final_tip_mm, 2),
-            number(self.final_error_mm, 2),
+            self.final_error_mm.map_or_else(unknown, three_digits),
         ]
     }
 }
@@ -238,6 +238,15 @@ impl Outcome {
 /// Returns a number with this many decimals.
 fn decimals(value: f64, digits: i32) -> String {
     painleve_chart::axis::label(value, 2.0 * 10_f64.powi(-digits))
+}
+
+/// Returns a number with three digits: a small arm's torques and a friction need more decimals than a force. Less than 10⁻⁶
+/// is rounding.
+fn three_digits(value: f64) -> String {
+    match value.abs() {
+        ..1e-6 => "0".into(),
+        size => painleve_chart::axis::label(value, size / 100.0),
+    }
 }
 
 /// A run lacks the event.
@@ -500,6 +509,26 @@ mod tests {
             .collect();
         assert_eq!(found[0], (Some(0.0), "1".into()));
         assert_eq!(found[1], (None, "0 at ticks".into()));
+    }
+
+    #[test]
+    fn differences_have_three_digits_whatever_their_size() {
+        let of = |mean, rms, largest| Difference {
+            run: "run".into(),
+            quantity: "friction",
+            mean,
+            rms,
+            largest,
+            at_s: 0.5,
+        };
+        assert_eq!(
+            of(1.0914e-5, -0.000125145, 37.461).cells()[2..],
+            ["1.09e−5", "−0.000125", "37.5", "0.500"]
+        );
+        assert_eq!(
+            of(-8.3e-14, 0.0, -1234.5).cells()[2..5],
+            ["0", "0", "−1234"]
+        );
     }
 
     #[test]
