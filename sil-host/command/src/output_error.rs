@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use painleve_chart::picture::PictureError;
 use painleve_commission::simulated::SimulatedError;
 use painleve_files::atomic_file::AtomicFileError;
+use painleve_files::input_file;
 use painleve_record::comparison::NoEvent;
 use painleve_record::export::ExportError;
 use painleve_record::recorder::RecordError;
@@ -59,6 +60,9 @@ pub enum RecordFileError {
     /// Its content cannot be used.
     #[error(transparent)]
     Content(#[from] ExportError),
+    /// It is something else.
+    #[error("it is no record, as `painleve run` writes")]
+    NoRecord,
     /// It has no settings.
     #[error("it has no settings of a run: this is not a record of painleve")]
     NoSettings,
@@ -236,9 +240,17 @@ impl InputError {
 
     /// A record, or a table of ticks, that cannot be used.
     pub fn record(path: &Path, source: impl Into<RecordFileError>) -> Self {
+        let source = match source.into() {
+            RecordFileError::Content(ExportError::Incomplete(_))
+                if !input_file::begins_as_mcap(path) =>
+            {
+                RecordFileError::NoRecord
+            }
+            source => source,
+        };
         Self::Record {
             path: path.to_path_buf(),
-            source: source.into(),
+            source,
         }
     }
 }

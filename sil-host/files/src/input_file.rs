@@ -19,6 +19,30 @@ pub const MOST_BYTES: u64 = 16 << 20;
 /// Largest size of a controller's image with its debug information, bytes. Real ones have ten million.
 pub const MOST_IMAGE_BYTES: u64 = 256 << 20;
 
+/// How files that are no scenario begin, what they are, and what takes them.
+const KINDS: [(&[u8], &str); 8] = [
+    (
+        MCAP,
+        "a record: `painleve export`, `compare` and `diff` read it",
+    ),
+    (
+        b"time_s,plant.",
+        "a table of ticks: `painleve compare` reads it after a record",
+    ),
+    (b"<svg", "a figure"),
+    (b"<!doctype html", "a page for a browser"),
+    (
+        b"<?xml",
+        "XML: `painleve arm` reads the arm of a URDF or an MJCF file",
+    ),
+    (b"<robot", "a URDF file: `painleve arm` reads its arm"),
+    (b"<mujoco", "an MJCF file: `painleve arm` reads its arm"),
+    (b"\x7fELF", "an image of a board: `--elf` takes it"),
+];
+
+/// How an MCAP file begins.
+const MCAP: &[u8] = b"\x89MCAP0\r\n";
+
 thread_local! {
     /// The contents that this thread has read in [`with_contents`], by path; `None` outside.
     static CONTENTS: RefCell<Option<BTreeMap<PathBuf, Vec<u8>>>> = const { RefCell::new(None) };
@@ -79,6 +103,24 @@ pub fn with_contents<T>(act: impl FnOnce() -> T) -> (T, BTreeMap<PathBuf, Vec<u8
     let outer = CONTENTS.replace(Some(BTreeMap::new()));
     let done = act();
     (done, CONTENTS.replace(outer).unwrap_or_default())
+}
+
+/// Returns what a file is, if it begins as one of those that painleve writes or reads elsewhere, and what takes it.
+pub fn kind(path: &Path) -> Option<&'static str> {
+    let mut head = Vec::new();
+    open(path).ok()?.take(32).read_to_end(&mut head).ok()?;
+    if head.starts_with(MCAP) && head.get(17..25) == Some(b"\x04\0\0\0ros2") {
+        return Some("a ROS 2 bag, which ROS reads");
+    }
+    KINDS
+        .iter()
+        .find_map(|(start, kind)| head.starts_with(start).then_some(*kind))
+}
+
+/// Whether a file begins as records and ROS 2 bags do.
+pub fn begins_as_mcap(path: &Path) -> bool {
+    let mut head = [0; MCAP.len()];
+    open(path).is_ok_and(|mut file| file.read_exact(&mut head).is_ok() && head == *MCAP)
 }
 
 /// Reads a regular file of at most `most_bytes`.

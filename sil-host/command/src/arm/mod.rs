@@ -109,7 +109,7 @@ fn read(text: &str, tip: Option<&Tip>) -> Result<Imported, String> {
         ..roxmltree::ParsingOptions::default()
     };
     let document = roxmltree::Document::parse_with_options(text, limited);
-    let document = document.map_err(|error| error.to_string())?;
+    let document = document.map_err(|error| format!("it is not XML: {error}"))?;
     let root = document.root_element();
     let chain = match root.tag_name().name() {
         "robot" => urdf::chain(root)?,

@@ -30,6 +30,14 @@ pub enum ScenarioError {
         /// Reason.
         source: std::io::Error,
     },
+    /// The file is something else.
+    #[error("{} is no scenario but {kind}", origin.trim_start_matches("scenario file "))]
+    Other {
+        /// The file.
+        origin: String,
+        /// What it is, and which command reads it.
+        kind: &'static str,
+    },
     /// The file is empty.
     #[error("{origin} is empty")]
     Empty {

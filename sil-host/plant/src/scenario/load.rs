@@ -135,11 +135,20 @@ fn read(name: &str) -> Result<Table, ScenarioError> {
 
 /// Reads a file whose scenario is called `name` unless it has a name itself.
 fn read_file(path: &Path, origin: &str, name: &str) -> Result<Table, ScenarioError> {
-    let text = input_file::read(path).map_err(|source| ScenarioError::Unreadable {
-        origin: origin.into(),
-        source,
+    let or_else = |error| match input_file::kind(path) {
+        Some(kind) => ScenarioError::Other {
+            origin: origin.into(),
+            kind,
+        },
+        None => error,
+    };
+    let text = input_file::read(path).map_err(|source| {
+        or_else(ScenarioError::Unreadable {
+            origin: origin.into(),
+            source,
+        })
     })?;
-    let mut table = parse(origin, &text)?;
+    let mut table = parse(origin, &text).map_err(or_else)?;
     if table.is_empty() {
         return Err(ScenarioError::Empty {
             origin: origin.into(),
@@ -407,6 +416,43 @@ mod tests {
         assert!(missing("no-such-scenario").contains("'; known: hybrid-elbow-down"));
         assert!(missing("edgee").contains("did you mean 'edge'?"));
         assert!(Scenario::load(folder.path().to_str().unwrap(), &[]).is_err());
+    }
+
+    #[test]
+    fn a_file_of_another_kind_is_named_with_the_command_that_reads_it() {
+        let folder = tempfile::tempdir().unwrap();
+        for (name, start, kind) in [
+            (
+                "run.mcap",
+                &b"\x89MCAP0\r\n\xff"[..],
+                "a record: `painleve export`, `compare` and `diff` read it",
+            ),
+            (
+                "run.csv",
+                b"time_s,plant.tip_t_m\n0,0.1\n",
+                "a table of ticks: `painleve compare`",
+            ),
+            (
+                "run.ros2.mcap",
+                b"\x89MCAP0\r\n\x01\x1c\0\0\0\0\0\0\0\x04\0\0\0ros2",
+                "a ROS 2 bag",
+            ),
+            ("run.svg", b"<svg xmlns=\"\">", "a figure"),
+            (
+                "arm.urdf",
+                b"<robot name=\"arm\">",
+                "a URDF file: `painleve arm` reads its arm",
+            ),
+        ] {
+            let path = folder.path().join(name);
+            std::fs::write(&path, start).unwrap();
+            let path = path.to_str().unwrap();
+            let message = Scenario::load(path, &[]).unwrap_err().to_string();
+            assert!(
+                message.starts_with(&format!("{path} is no scenario but {kind}")),
+                "{message}"
+            );
+        }
     }
 
     #[test]
