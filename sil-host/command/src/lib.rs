@@ -256,6 +256,7 @@ impl CommandError {
                 | StudyError::NothingAdmissible
                 | StudyError::Range(_)
                 | StudyError::LevelsOfSeveralEffects
+                | StudyError::NotFractional(_)
                 | StudyError::SeveralFrictions { .. }
                 | StudyError::TooManyRows(_) => 2,
             },

@@ -32,7 +32,7 @@ use crate::mechanics::{PlantParameters, SolverSettings};
 
 pub use crate::mechanics::belt::BeltSettings;
 pub use crate::mechanics::{Elbow, InitialState};
-pub use error::ScenarioError;
+pub use error::{KeyError, ScenarioError};
 pub use knowledge::Knowledge;
 pub use override_key::{first_outside, sets};
 pub use words::{TomlError, known_names};

@@ -77,6 +77,9 @@ pub enum StudyError {
     /// Levels without exactly one effect whose levels they are.
     #[error("--level needs exactly one effect other than none in --effect")]
     LevelsOfSeveralEffects,
+    /// A key to search has values that are not fractional.
+    #[error("{0}; only keys with fractional values can be searched")]
+    NotFractional(ScenarioError),
     /// A position is out of reach.
     #[error(
         "z_t = {tip_t_m} m is out of reach: the tip reaches the belt from −{reach_m:.4} to {reach_m:.4} m"

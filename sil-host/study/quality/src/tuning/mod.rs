@@ -14,7 +14,7 @@ mod tests;
 use painleve_plant::closed_loop::{ClosedLoop, LoopError, Monitor};
 use painleve_plant::controller_host::InProcess;
 use painleve_plant::sample::Sample;
-use painleve_plant::scenario::Scenario;
+use painleve_plant::scenario::{KeyError, Scenario, ScenarioError};
 use painleve_plant::simulation::Simulation;
 use painleve_process::interrupt::Interrupt;
 use painleve_study_core::StudyError;
@@ -98,7 +98,15 @@ impl Tuning {
     pub fn check(&self) -> Result<(), StudyError> {
         for end in [0.0, 1.0] {
             let values: Vec<f64> = self.ranges.iter().map(|range| range.at(end)).collect();
-            let scenario = self.with(&values)?;
+            let scenario = self.with(&values).map_err(|error| match error {
+                StudyError::Scenario(
+                    source @ ScenarioError::Key {
+                        source: KeyError::Value { .. },
+                        ..
+                    },
+                ) => StudyError::NotFractional(source),
+                error => error,
+            })?;
             Simulation::new(&scenario)?;
         }
         Ok(())

@@ -131,12 +131,19 @@ fn a_range_that_is_none_is_refused() {
         let error = text.parse::<Range>().unwrap_err().to_string();
         assert!(error.contains(text) && error.contains("FROM:TO"), "{error}");
     }
-    let unknown = Tuning {
-        ranges: vec!["belt.frction=0.1:1".parse().unwrap()],
-        ..tuning()
+    let refusal = |range: &str| {
+        let ranges = vec![range.parse().unwrap()];
+        let wrong = Tuning { ranges, ..tuning() };
+        wrong.check().unwrap_err().to_string()
     };
-    let error = unknown.check().unwrap_err().to_string();
-    assert!(error.contains("did you mean 'friction'?"), "{error}");
+    let (unknown, whole) = (
+        refusal("belt.frction=0.1:1"),
+        refusal("run.tick_hz=500:2000"),
+    );
+    assert!(unknown.contains("did you mean 'friction'?"), "{unknown}");
+    assert!(!unknown.contains("fractional"), "{unknown}");
+    let fractional = "not 500.0; only keys with fractional values can be searched";
+    assert!(whole.ends_with(fractional), "{whole}");
 }
 
 /// On a compliant belt, a tip set down without pressing bounces once before it is captured.
