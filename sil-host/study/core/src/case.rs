@@ -12,6 +12,7 @@ use painleve_shared::{Arm, ArmParameters, Posture, Slip};
 use serde::{Serialize, Serializer};
 
 use crate::StudyError;
+use crate::initial::{Initial, START};
 
 /// The controller of a case.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -43,9 +44,17 @@ impl ControllerChoice {
     ///
     /// # Errors
     /// [`StudyError`] naming the controller if the scenario does not exist or a key is wrong.
-    pub(crate) fn load_unplaced(&self) -> Result<Scenario, StudyError> {
+    pub fn load_unplaced(&self) -> Result<Scenario, StudyError> {
         let (name, _) = self.source(Posture::ElbowDown);
         Ok(Scenario::load_unplaced(name, &[])?)
+    }
+
+    /// Returns the converters that suit its arm: those of hardware for the paper's, its own for that of a scenario.
+    pub fn usual_converters(&self) -> ConverterChoice {
+        match self {
+            Self::Scenario(_) => ConverterChoice::Own,
+            _ => ConverterChoice::Hardware,
+        }
     }
 
     /// Returns the built-in scenario or file for a posture, and the overrides to apply to it.
@@ -108,6 +117,17 @@ pub enum ConverterChoice {
     Hardware,
     /// The converters of the controller's scenario.
     Own,
+}
+
+impl ConverterChoice {
+    /// Returns the name of a scenario with these converters, for messages.
+    fn origin(self, controller: &ControllerChoice) -> String {
+        match self {
+            Self::Ideal => format!("controller {controller} with ideal converters"),
+            Self::Hardware => format!("controller {controller} with hardware converters"),
+            Self::Own => format!("controller {controller}"),
+        }
+    }
 }
 
 /// The shape of the reference from the start to its target.
@@ -193,9 +213,6 @@ impl Serialize for Reference {
     }
 }
 
-/// z_t of the paper's x0,d and x0,u as a fraction of the reach: −0.1624 m of 0.1841 m.
-const START: f64 = -0.882;
-
 /// Returns the initial state of a closed loop in a posture, far from the edge that a tip meets with this slip: the paper's
 /// x0,d or x0,u; for an arm of another shape or the other slip, at rest on the belt at the same fraction of its reach.
 ///
@@ -206,20 +223,15 @@ pub fn start(
     posture: Posture,
     slip: Slip,
 ) -> Result<InitialState, StudyError> {
-    let of_paper = ArmParameters::<f64>::default();
-    let is_of_paper = arm.link_length_m == of_paper.link_length_m
-        && arm.height_m == of_paper.height_m
-        && slip == Slip::Positive;
-    if !is_of_paper {
-        let arm = Arm::new(*arm)?;
-        let start_m = START * slip.sign::<f64>() * arm.reach_on_belt_m();
-        return at_rest_on_belt(&arm, start_m, posture);
+    let arm = Arm::new(*arm)?;
+    let initial = match posture {
+        Posture::ElbowDown => Initial::D,
+        Posture::ElbowUp => Initial::U,
+    };
+    match initial.angles_deg(&arm).filter(|_| slip == Slip::Positive) {
+        Some([theta_1, theta_2]) => Ok(InitialState::at_rest(theta_1, theta_2)),
+        None => at_rest_on_belt(&arm, -START * arm.reach_on_belt_m(), posture),
     }
-    let [theta_1, theta_2] = InitialState::X0_D_DEG;
-    Ok(match posture {
-        Posture::ElbowDown => InitialState::at_rest(theta_1, theta_2),
-        Posture::ElbowUp => InitialState::at_rest(theta_2, theta_1),
-    })
 }
 
 /// Returns an arm at rest in a posture with its tip on the belt at `tip_t_m` (m).
@@ -279,7 +291,7 @@ pub fn scenario(
         }
         ConverterChoice::Own => {}
     }
-    let origin = format!("controller {controller}");
+    let origin = converters.origin(controller);
     let mut scenario = scenario.with_overrides(&origin, overrides)?;
     if *controller == ControllerChoice::HybridPaperModel {
         let (friction, speed_m_s) = (scenario.belt.friction, scenario.belt.profile.speed_m_s(0.0));

@@ -6,14 +6,16 @@
 use core::fmt;
 
 use painleve_plant::State;
-use painleve_shared::{Arm, Posture};
+use painleve_plant::scenario::InitialState;
+use painleve_shared::{Arm, ArmParameters, Posture};
 use rand::rngs::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
 
 /// The initial condition of a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Initial {
-    /// The paper's x0,a: θ = (32°, 18.27°), at rest on the belt, in the paradox.
+    /// The paper's x0,a: θ = (32°, 18.27°), at rest on the belt, in the paradox. An arm of another shape starts in the same
+    /// posture at the same fraction of its reach, as from `D` and `U`.
     A,
     /// The paper's x0,d: θ = (−11.4°, −35.1°), at rest on the belt, elbow down.
     D,
@@ -87,6 +89,12 @@ const RANDOM_HEIGHT_M: f64 = 0.03;
 /// Largest rate of a joint in a random start, rad/s.
 const RANDOM_RATE_RAD_S: f64 = 5.0;
 
+/// z_t of the paper's x0,d and x0,u as a fraction of the reach: −0.1624 m of 0.1841 m.
+pub(crate) const START: f64 = -0.882;
+
+/// z_t of the paper's x0,a: 0.1771 m of 0.1841 m.
+const INCONSISTENT: f64 = 0.962;
+
 /// Fraction of the reach in which random starts lie; at the full reach the arm is straight.
 const RANDOM_REACH: f64 = 0.98;
 
@@ -101,19 +109,34 @@ impl Initial {
         }
     }
 
+    /// Returns θ1 and θ2 of an arm, degrees; `None` if they are random.
+    pub fn angles_deg(self, arm: &Arm<f64>) -> Option<[f64; 2]> {
+        let [theta_1, theta_2] = InitialState::X0_D_DEG;
+        let (of_paper, share, posture) = match self {
+            Self::A => ([32.0, 18.27], INCONSISTENT, Posture::ElbowDown),
+            Self::D => ([theta_1, theta_2], START, Posture::ElbowDown),
+            Self::U => ([theta_2, theta_1], START, Posture::ElbowUp),
+            Self::Random(_) => return None,
+        };
+        let paper = ArmParameters::<f64>::default();
+        if (arm.link_length_m(), arm.height_m()) == (paper.link_length_m, paper.height_m) {
+            return Some(of_paper);
+        }
+        let theta = arm.link_angles_on_belt_rad(share * arm.reach_on_belt_m(), posture)?;
+        Some(theta.to_array().map(f64::to_degrees))
+    }
+
     /// Returns the initial state for an arm. A random one has its tip anywhere within reach, up to 3 cm
     /// above the belt (less above a high belt), the elbow on either side and each joint rate at up to
     /// 5 rad/s. It depends only on
     /// `seed`, `row` and the arm.
     pub fn state(self, arm: &Arm<f64>, seed: u64, row: u64) -> State {
-        let at_rest = |theta1_deg: f64, theta2_deg: f64| {
-            State::new(theta1_deg.to_radians(), theta2_deg.to_radians(), 0.0, 0.0)
-        };
-        match self {
-            Self::A => at_rest(32.0, 18.27),
-            Self::D => at_rest(-11.4, -35.1),
-            Self::U => at_rest(-35.1, -11.4),
-            Self::Random(_) => random_state(arm, seed, row),
+        match self.angles_deg(arm) {
+            Some(angles) => {
+                let [theta_1, theta_2] = angles.map(f64::to_radians);
+                State::new(theta_1, theta_2, 0.0, 0.0)
+            }
+            None => random_state(arm, seed, row),
         }
     }
 }
@@ -146,8 +169,9 @@ fn random_state(arm: &Arm<f64>, seed: u64, row: u64) -> State {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use painleve_plant::mechanics::motion::theta;
     use painleve_plant::mechanics::{ArmOnBelt, PlantParameters};
-    use painleve_shared::ArmParameters;
+    use painleve_shared::Pose;
     use proptest::prelude::*;
 
     #[test]
@@ -174,6 +198,30 @@ mod tests {
         ] {
             let message = text.parse::<Initials>().unwrap_err();
             assert!(message.contains(part), "{message}");
+        }
+    }
+
+    #[test]
+    fn an_arm_of_another_shape_starts_like_the_papers_at_the_same_fraction_of_its_reach() {
+        let other = ArmParameters {
+            link_length_m: [0.6, 0.5],
+            height_m: 0.99,
+            ..Default::default()
+        };
+        for (initial, posture) in [
+            (Initial::A, Posture::ElbowDown),
+            (Initial::D, Posture::ElbowDown),
+            (Initial::U, Posture::ElbowUp),
+        ] {
+            let [paper, other] = [ArmParameters::default(), other].map(|parameters| {
+                let arm = Arm::new(parameters).unwrap();
+                let theta = theta(&initial.state(&arm, 1, 0));
+                assert_eq!(Posture::of(&theta), posture);
+                let pose = Pose::new(&theta);
+                assert!(arm.gap_m(&pose).abs() < 1e-3);
+                arm.tip_m(&pose).x / arm.reach_on_belt_m()
+            });
+            assert!((paper - other).abs() < 1e-3, "{initial}: {paper} {other}");
         }
     }
 

@@ -13,6 +13,7 @@ use painleve_plant::scenario::{self, Scenario};
 use painleve_shared::Posture;
 
 use crate::case::{ControllerChoice, ConverterChoice};
+use crate::grid::once;
 use crate::initial::Initials;
 use crate::{Grid, StudyError};
 
@@ -78,7 +79,7 @@ impl BaseOptions {
 /// Changes to every scenario of a study.
 #[derive(Clone, Debug, Args)]
 pub struct Overrides {
-    /// Override one key of the plant or the controller, for example arm.height_m=0.36; may be repeated.
+    /// Override one key of the plant or the controller, for example arm.tip_mass_kg=0.02; may be repeated.
     #[arg(long = "set", value_name = "KEY=VALUE")]
     pub overrides: Vec<String>,
 }
@@ -209,7 +210,8 @@ pub struct BeltSpeedGrid {
 /// Initial conditions of a study.
 #[derive(Clone, Debug, Args)]
 pub struct InitialOptions {
-    /// Initial conditions: the paper's a, d and u, and random ones as random:N, for example a,d,random:8.
+    /// Initial conditions: the paper's a, d and u, for an arm of another shape at the same fraction of its reach, and random
+    /// ones as random:N, for example a,d,random:8.
     #[arg(long, value_name = "LIST", default_value = "a")]
     pub initial: Initials,
     /// Seed of the random initial conditions.
@@ -255,15 +257,27 @@ pub struct ControllerOptions {
 /// Converters of a closed-loop study.
 #[derive(Clone, Debug, Args)]
 pub struct ConverterOptions {
-    /// Converters: ideal (as in the paper), hardware, or the scenario's own.
-    #[arg(
-        long,
-        value_name = "SETS",
-        value_enum,
-        value_delimiter = ',',
-        default_value = "hardware"
-    )]
-    pub converters: Vec<ConverterChoice>,
+    /// Converters: ideal (as in the paper), hardware, or the scenario's own; by default own if a controller is a scenario or
+    /// file, or else hardware.
+    #[arg(long, value_name = "SETS", value_enum, value_delimiter = ',')]
+    converters: Vec<ConverterChoice>,
+}
+
+impl ConverterOptions {
+    /// Returns the converters, each once: by default those of the scenarios if a controller is one, or else `usual`.
+    pub fn of(
+        &self,
+        controllers: &[ControllerChoice],
+        usual: &[ConverterChoice],
+    ) -> Vec<ConverterChoice> {
+        let own = ConverterChoice::Own;
+        let has_own = |controller: &ControllerChoice| controller.usual_converters() == own;
+        match &self.converters[..] {
+            [] if controllers.iter().any(has_own) => vec![own],
+            [] => usual.to_vec(),
+            given => once(given),
+        }
+    }
 }
 
 /// A posture on the command line.

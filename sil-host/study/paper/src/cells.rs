@@ -231,14 +231,5 @@ mod tests {
             let message = cells.check().unwrap_err().to_string();
             assert!(message.contains(part), "{message}");
         }
-        // With so high a belt, x0,a is deep inside it.
-        let mut high = cells();
-        high.plant.arm.height_m = 0.3;
-        assert!(
-            high.check()
-                .unwrap_err()
-                .to_string()
-                .contains("initial tip height")
-        );
     }
 }

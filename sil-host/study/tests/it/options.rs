@@ -20,6 +20,61 @@ fn refusal(line: &str) -> String {
         .map_or("accepted".into(), |error| error.to_string())
 }
 
+/// A scenario file with an arm that is larger, stronger and of another shape than the paper's.
+fn large_arm() -> tempfile::NamedTempFile {
+    let file = tempfile::Builder::new().suffix(".toml").tempfile().unwrap();
+    let text = "[arm]
+        link_length_m = [0.6, 0.5]
+        link_mass_kg = [3.0, 1.5]
+        height_m = 0.99
+        [converters.torque]
+        range_nm = 40.0
+        [controller]
+        torque_limit_nm = 40.0
+        reference = [{ minimum-jerk = { target_m = 0.3, duration_s = 3.0 } }]
+        [initial]
+        tip_m = -0.4";
+    std::fs::write(file.path(), text).unwrap();
+    file
+}
+
+/// By default: with its own converters, to its own target, from and at places within its reach.
+#[test]
+fn every_study_takes_the_arm_of_a_scenario_file() {
+    let (large, short) = (large_arm(), "--set arm.height_m=0.415");
+    let path = large.path().display();
+    for line in [
+        format!("sliding-range --controller {path}"),
+        format!("closed-loop-bifurcation --controller {path} --v-belt=-0.4"),
+        format!("effects --controller {path} --runs 1"),
+        format!("loop --controller {path}"),
+        format!("loop --controller hybrid,{path}"),
+        format!("loop {short}"),
+        format!("regions --scenario {path}"),
+        format!("regions {short}"),
+        format!("bifurcation --scenario {path} --initial a,d,u"),
+        format!("poincare {short}"),
+        format!("stiffness --scenario {path}"),
+        format!("stiffness {short}"),
+    ] {
+        assert_eq!(refusal(&line), "accepted", "{line}");
+    }
+    let message = refusal(&format!(
+        "sliding-range --converters ideal,hardware --controller {path}"
+    ));
+    assert_eq!(
+        message,
+        format!(
+            "controller {path} with ideal converters: controller.torque_limit_nm = 40 is outside the allowed range 0 to 5"
+        )
+    );
+    let message = refusal("stiffness --set belt.profile.speed_m_s=0.5");
+    assert!(
+        message.starts_with("belt.profile.speed_m_s = 0.5 is outside"),
+        "{message}"
+    );
+}
+
 #[test]
 fn keys_that_the_study_itself_sets_are_refused() {
     for (line, key) in [

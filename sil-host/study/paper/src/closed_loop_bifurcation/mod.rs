@@ -50,7 +50,7 @@ pub struct ClosedLoopBifurcation {
     pub seed: u64,
     /// Shape of the reference.
     pub reference: Reference,
-    /// Target, m; by default the paper's Z_t,sliding for the law and posture.
+    /// Target, m; by default that of the controller's scenario, or the paper's Z_t,sliding for the law and posture.
     pub target_m: Option<f64>,
     /// Transient of a cell before recording starts, s.
     pub transient_s: f64,
@@ -148,9 +148,14 @@ impl ClosedLoopBifurcation {
             }
             scenario.initial = InitialState::from(&state);
         }
-        let target_m = self
-            .target_m
-            .unwrap_or_else(|| printed::target_m(controller, start_posture));
+        let own_target_m = match controller {
+            ControllerChoice::Scenario(_) => controller.load_unplaced()?.target_m(),
+            _ => None,
+        };
+        let target_m = self.target_m.or(own_target_m).unwrap_or_else(|| {
+            let against_belt: f64 = scenario.slip_at_rest().sign();
+            against_belt * printed::target_m(controller, start_posture)
+        });
         let reach_m = printed_reach_m(&Arm::new(scenario.arm)?);
         range::check("--target-m", target_m, -reach_m, reach_m)?;
         scenario.controller.reference = self.reference.to(target_m);

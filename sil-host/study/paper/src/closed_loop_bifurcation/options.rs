@@ -2,7 +2,7 @@
 
 use clap::Args;
 use painleve_study_core::StudyError;
-use painleve_study_core::case::Reference;
+use painleve_study_core::case::{ConverterChoice, Reference};
 use painleve_study_core::catalogue::{InShards, PageSection, StudyOptions, in_shards};
 use painleve_study_core::figures::page_maker::PageMaker;
 use painleve_study_core::grid::once;
@@ -37,7 +37,8 @@ pub struct Options {
     /// Reference: minimum-jerk:SECONDS, ramp:SECONDS or step.
     #[arg(long, default_value = "minimum-jerk:3")]
     reference: Reference,
-    /// Target of the reference, m; by default the paper's farthest target for the law and posture.
+    /// Target of the reference, m; by default that of the controller's scenario or file, or the paper's farthest target for the
+    /// law and posture.
     #[arg(long, value_name = "METRES")]
     target_m: Option<f64>,
     #[command(flatten)]
@@ -62,7 +63,9 @@ impl StudyOptions for Options {
         ])?;
         let study = ClosedLoopBifurcation {
             controllers: once(&self.controllers.controller),
-            converters: once(&self.converters.converters),
+            converters: self
+                .converters
+                .of(&self.controllers.controller, &[ConverterChoice::Hardware]),
             mu: self.friction.of_controllers(&self.controllers.controller)?,
             v_belt_m_s: self.belt.v_belt.values().to_vec(),
             initial: self.initial.initial.list().to_vec(),

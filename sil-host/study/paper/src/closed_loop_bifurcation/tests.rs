@@ -114,6 +114,18 @@ fn belt_speeds_are_named_from_the_least_to_the_greatest() {
     assert!(table.contains("0 of 4"), "{table}");
 }
 
+/// From the mirrored start, to the edge that a tip meets on this belt.
+#[test]
+fn a_belt_in_the_other_direction_has_the_mirrored_target() {
+    let study = ClosedLoopBifurcation {
+        v_belt_m_s: vec![-0.4, 0.4],
+        initial: vec![Initial::D],
+        ..study(ControllerChoice::Hybrid)
+    };
+    let targets = [0, 1].map(|index| study.scenario(index).unwrap().0.target_m);
+    assert_eq!(targets, [0.148, -0.148]);
+}
+
 #[test]
 fn random_starts_are_followed_in_their_own_posture() {
     let study = ClosedLoopBifurcation {

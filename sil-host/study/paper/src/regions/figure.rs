@@ -6,8 +6,8 @@ use painleve_chart::style::{
     BLACK_INK, BLUE_INK, Colour, GREY, ORANGE, SKY, VERMILLION, over_white,
 };
 use painleve_chart::{Chart, Mark, Panel};
-use painleve_plant::scenario::InitialState;
 use painleve_shared::{Arm, Slip, SolutionMode};
+use painleve_study_core::initial::Initial;
 use painleve_study_core::outcome::Figure;
 
 use super::lines::RegionColumn;
@@ -59,22 +59,22 @@ impl Map {
         format!("{side}, {slip}")
     }
 
-    /// Returns the paper's initial conditions on this side of the vertical; at rest on a belt of
-    /// negative speed, they slip in the positive direction.
-    fn initial_conditions(&self) -> Vec<(&'static str, f64)> {
+    /// Returns θ1 of the paper's initial conditions on this side of the vertical, degrees; at rest on a belt of negative speed,
+    /// they slip in the positive direction.
+    fn initial_conditions(&self, arm: &Arm<f64>) -> Vec<(&'static str, f64)> {
         if self.slip == Slip::Negative {
             return Vec::new();
         }
-        let [theta_1, theta_2] = InitialState::X0_D_DEG;
-        [
-            ("x0,a", 32.0, 18.27),
-            ("x0,d", theta_1, theta_2),
-            ("x0,u", theta_2, theta_1),
-        ]
-        .into_iter()
-        .filter(|(_, _, theta2)| theta2 * self.theta2.sign() > 0.0)
-        .map(|(name, theta1, _)| (name, theta1))
-        .collect()
+        let all = [
+            ("x0,a", Initial::A),
+            ("x0,d", Initial::D),
+            ("x0,u", Initial::U),
+        ];
+        all.into_iter()
+            .filter_map(|(name, initial)| Some((name, initial.angles_deg(arm)?)))
+            .filter(|(_, [_, theta2])| theta2 * self.theta2.sign() > 0.0)
+            .map(|(name, [theta1, _])| (name, theta1))
+            .collect()
     }
 
     fn panel(&self, arm: &Arm<f64>, mu: f64) -> Panel {
@@ -139,7 +139,7 @@ impl Map {
             let points = vec![(theta1, rate_range.start), (theta1, rate_range.end)];
             marks.push(Mark::dashed(name, RED, points));
         }
-        for (name, theta1) in self.initial_conditions() {
+        for (name, theta1) in self.initial_conditions(arm) {
             marks.push(Mark::Dots {
                 name: String::new(),
                 colour: BLUE_INK,

@@ -120,16 +120,9 @@ impl RegionsStudy {
         Ok(())
     }
 
-    fn reach_rad(&self) -> f64 {
-        // θ2 = 0 at the full reach.
-        let [length_1, length_2] = self.arm.link_length_m;
-        let cosine = self.arm.height_m / length_1 - length_2 / length_1;
-        libm::acos(cosine.clamp(-1.0, 1.0))
-    }
-
     /// Returns the values of θ1 within reach, degrees.
     fn columns(&self) -> Result<Vec<f64>, StudyError> {
-        let reach_rad = self.reach_rad();
+        let reach_rad = reach_rad(&self.arm);
         let all = self.theta1_deg.values().iter().copied();
         let theta1_deg: Vec<f64> = all
             .filter(|theta1| theta1.to_radians().abs() < reach_rad)
@@ -141,6 +134,24 @@ impl RegionsStudy {
         }
         Ok(theta1_deg)
     }
+}
+
+/// Returns the largest |θ1| with the tip on the belt.
+fn reach_rad(arm: &ArmParameters<f64>) -> f64 {
+    // θ2 = 0 at the full reach.
+    let [length_1, length_2] = arm.link_length_m;
+    let cosine = arm.height_m / length_1 - length_2 / length_1;
+    libm::acos(cosine.clamp(-1.0, 1.0))
+}
+
+/// Returns every half degree of θ1 with the tip on the belt.
+///
+/// # Errors
+/// [`StudyError::Grid`], for no arm that reaches its belt.
+fn half_degrees(arm: &ArmParameters<f64>) -> Result<Grid, StudyError> {
+    let last_deg = 0.5 * ((2.0 * reach_rad(arm).to_degrees()).ceil() - 1.0);
+    let grid = format!("{}:{last_deg}:0.5", -last_deg);
+    grid.parse().map_err(StudyError::Grid)
 }
 
 /// One row per map.
@@ -164,7 +175,7 @@ impl Regions {
     pub fn new(settings: &RegionsStudy, maps: Vec<Map>) -> Self {
         Self {
             mu: settings.mu,
-            reach_deg: settings.reach_rad().to_degrees(),
+            reach_deg: reach_rad(&settings.arm).to_degrees(),
             maps,
             arm: settings.arm,
         }
@@ -209,7 +220,7 @@ fn map(
         theta2,
         slip,
         p_zero_theta1_deg: zeros_of_p(arm, mu, theta2, slip),
-        b_zero: zeros_of_b(arm, settings.reach_rad(), theta2),
+        b_zero: zeros_of_b(arm, reach_rad(&settings.arm), theta2),
         sliding: part(SolutionMode::Sliding),
         flight: part(SolutionMode::Flight),
         indeterminate: part(SolutionMode::Indeterminate),

@@ -8,7 +8,7 @@ use painleve_study_core::grid::once;
 use painleve_study_core::options::BaseOptions;
 use painleve_study_core::{Grid, StudyError};
 
-use super::{Map, Regions, RegionsStudy, Theta2, page};
+use super::{Map, Regions, RegionsStudy, Theta2, half_degrees, page};
 
 /// A slip direction on the command line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -25,14 +25,10 @@ pub struct Options {
     /// Friction coefficient μ; the scenario's by default.
     #[arg(long)]
     mu: Option<f64>,
-    /// θ1 in degrees, FROM:TO:STEP or a list; values that do not reach the belt are discarded.
-    #[arg(
-        long,
-        value_name = "GRID",
-        default_value = "-37:37:0.5",
-        allow_hyphen_values = true
-    )]
-    theta1_deg: Grid,
+    /// θ1 in degrees, FROM:TO:STEP or a list; values that do not reach the belt are discarded. By default every half degree
+    /// that does.
+    #[arg(long, value_name = "GRID", allow_hyphen_values = true)]
+    theta1_deg: Option<Grid>,
     /// Rate of θ1 in rad/s, FROM:TO:STEP or a list.
     #[arg(
         long,
@@ -79,7 +75,10 @@ impl StudyOptions for Options {
         let settings = RegionsStudy {
             arm: scenario.arm,
             mu: self.mu.unwrap_or(scenario.belt.friction),
-            theta1_deg: self.theta1_deg.clone(),
+            theta1_deg: match &self.theta1_deg {
+                Some(grid) => grid.clone(),
+                None => half_degrees(&scenario.arm)?,
+            },
             theta1_dot_rad_s: self.theta1_dot_rad_s.clone(),
             theta2: once(&self.theta2),
             slips: slips.collect(),

@@ -7,7 +7,7 @@ use painleve_study_core::catalogue::PageSection;
 use painleve_study_core::figures::page::{Comparison, Section};
 use painleve_study_core::figures::page_maker::{PageMaker, section};
 
-use super::{Map, Regions, RegionsStudy, Theta2};
+use super::{Map, Regions, RegionsStudy, Theta2, half_degrees};
 use crate::printed;
 
 /// Fig. 3 with the paper's arm.
@@ -15,10 +15,11 @@ use crate::printed;
 /// # Errors
 /// [`StudyError`] if the study cannot be computed.
 pub fn sections(page: &PageMaker<'_>) -> Result<Vec<PageSection>, StudyError> {
+    let arm = PlantParameters::default().arm;
     let settings = RegionsStudy {
-        arm: PlantParameters::default().arm,
+        arm,
         mu: printed::FRICTION,
-        theta1_deg: "-37:37:0.5".parse().map_err(StudyError::Grid)?,
+        theta1_deg: half_degrees(&arm)?,
         theta1_dot_rad_s: "-8:8:0.2".parse().map_err(StudyError::Grid)?,
         theta2: vec![Theta2::Positive, Theta2::Negative],
         slips: vec![Slip::Positive, Slip::Negative],

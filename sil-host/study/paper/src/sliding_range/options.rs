@@ -2,7 +2,7 @@
 
 use clap::Args;
 use painleve_study_core::StudyError;
-use painleve_study_core::case::Reference;
+use painleve_study_core::case::{ConverterChoice, Reference};
 use painleve_study_core::catalogue::{InShards, PageSection, StudyOptions, in_shards};
 use painleve_study_core::figures::page_maker::PageMaker;
 use painleve_study_core::grid::once;
@@ -11,6 +11,9 @@ use painleve_study_core::options::{
 };
 
 use super::{Criterion, Row, SlidingRange, SlidingRanges, page};
+
+const CONVERTERS_HELP: &str = "Converters: ideal (as in the paper), hardware, or the scenario's own; by default own if a \
+    controller is a scenario or file, or else ideal,hardware";
 
 /// How far the tip slides under each controller before it leaves the belt.
 ///
@@ -23,7 +26,7 @@ use super::{Criterion, Row, SlidingRange, SlidingRanges, page};
     mut_arg("controller", |controller| {
         controller.default_value("pid,hybrid-paper,hybrid-paper-model,hybrid")
     }),
-    mut_arg("converters", |converters| converters.default_value("ideal,hardware"))
+    mut_arg("converters", |converters| converters.help(CONVERTERS_HELP))
 )]
 pub struct Options {
     #[command(flatten)]
@@ -105,7 +108,10 @@ impl StudyOptions for Options {
         ])?;
         let study = SlidingRange {
             controllers: once(&self.controllers.controller),
-            converters: once(&self.converters.converters),
+            converters: self.converters.of(
+                &self.controllers.controller,
+                &[ConverterChoice::Ideal, ConverterChoice::Hardware],
+            ),
             postures: once(&self.posture).into_iter().map(Into::into).collect(),
             mu: self.friction.of_controllers(&self.controllers.controller)?,
             references: once(&self.reference),

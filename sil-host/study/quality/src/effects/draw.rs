@@ -3,9 +3,9 @@
 use core::ops::Range;
 
 use painleve_plant::scenario::Scenario;
-use painleve_shared::{Arm, Posture};
+use painleve_shared::{Arm, ArmParameters, Posture};
 use painleve_study_core::StudyError;
-use painleve_study_core::case::{self, ConverterChoice};
+use painleve_study_core::case;
 use rand::rngs::ChaCha8Rng;
 use rand::{RngExt, SeedableRng};
 
@@ -34,7 +34,8 @@ impl EffectsStudy {
         } else {
             Posture::ElbowUp
         };
-        let drawn = Drawn {
+        let mut drawn = Drawn {
+            arm: ArmParameters::default(),
             friction,
             speed_m_s,
             at_s: draw(0.8..3.0),
@@ -48,8 +49,8 @@ impl EffectsStudy {
             format!("belt.friction={friction:?}"),
             format!("belt.profile={{ kind = 'constant', speed_m_s = {speed_m_s:?} }}"),
         ];
-        let mut scenario =
-            case::scenario(place.controller, posture, ConverterChoice::Hardware, &belt)?;
+        let converters = place.controller.usual_converters();
+        let mut scenario = case::scenario(place.controller, posture, converters, &belt)?;
         let (effect, level) = (place.effect, place.level);
         scenario.name = format!("{}-{level}-{}-{run}", effect.name, self.seed);
         scenario.run.seed = noise_seed;
@@ -57,7 +58,12 @@ impl EffectsStudy {
             Contact::Rigid => Vec::new(),
             Contact::Compliant => vec!["contact.kind=compliant".to_owned()],
         };
+        drawn.arm = scenario.arm;
         overrides.extend(effect.overrides(level, &drawn));
+        // What the effect does not change of the controller's model is this arm's.
+        if overrides.iter().any(|text| text.starts_with("arm_model.")) {
+            scenario.arm_model.get_or_insert(scenario.arm.cast());
+        }
         overrides.extend(self.overrides.iter().cloned());
         let origin = format!("effect {} at level {level}", effect.name);
         let mut scenario = scenario.with_overrides(&origin, &overrides)?;

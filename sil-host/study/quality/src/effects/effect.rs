@@ -1,5 +1,6 @@
 //! One effect of the study, and the settings of its levels.
 
+use painleve_shared::ArmParameters;
 use serde::Serialize;
 
 use crate::robustness::LiftOffRule;
@@ -42,6 +43,8 @@ pub enum LevelOverrides {
 /// Random values of a run that effects use.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Drawn {
+    /// The arm.
+    pub arm: ArmParameters<f64>,
     /// Friction coefficient μ of the belt, 0.3 … 0.9.
     pub friction: f64,
     /// Speed of the belt, 0.1 … 1 m/s in either direction.

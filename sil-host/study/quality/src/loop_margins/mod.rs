@@ -32,7 +32,7 @@ use painleve_shared::{Arm, Posture};
 use serde::Serialize;
 
 use painleve_plant::belt_line;
-use painleve_study_core::case::{self, ControllerChoice, ConverterChoice};
+use painleve_study_core::case::{self, ControllerChoice};
 use painleve_study_core::tabular::Tabular;
 use painleve_study_core::{Study, StudyError, check_rows};
 
@@ -185,11 +185,7 @@ impl LoopMargins {
             .chain(self.overrides.iter().cloned())
             .chain(changes.iter().cloned());
         let overrides: Vec<String> = overrides.collect();
-        let converters = match controller {
-            // Control rate, delays and ranges of somebody's own arm decide its margins.
-            ControllerChoice::Scenario(_) => ConverterChoice::Own,
-            _ => ConverterChoice::Hardware,
-        };
+        let converters = controller.usual_converters();
         let mut scenario = case::scenario(controller, self.posture, converters, &overrides)?;
         // The response of the contact is estimated from what rounding to counts does to the force, which fine converters
         // do not do. With counts, the controller finds this contact rigid.

@@ -24,6 +24,7 @@ use painleve_plant::mechanics::{ArmOnBelt, BuiltInPlant, PlantParameters};
 use painleve_plant::{Event, Plant, Probe, State, Step};
 use painleve_shared::settings::Settings;
 use painleve_shared::{Arm, JointTorque, OutOfRange, Pose, Posture};
+use painleve_study_core::initial::Initial;
 use painleve_study_core::tabular::Tabular;
 use painleve_study_core::{Grid, Study, StudyError};
 use serde::Serialize;
@@ -39,9 +40,6 @@ const BRISTLE_FORCE_N: f64 = 10.0;
 const BOUNCING_MASS_KG: f64 = 0.2;
 /// Local error of the integration.
 const LOCAL_ERROR: f64 = 1e-7;
-/// The paper's x0,a and x0,d.
-const INCONSISTENT_DEG: (f64, f64) = (32.0, 18.27);
-const ON_BELT_DEG: (f64, f64) = (-11.4, -35.1);
 /// Time after which the arm slides quietly, and duration of the compared slide, s.
 const QUIET_S: f64 = 30.0;
 const SLIDE_TICKS: u32 = 100;
@@ -126,7 +124,8 @@ impl Stiffness {
     /// [`OutOfRange`] naming the first parameter of the arm that is out of range.
     pub fn sticking_mass_kg(&self) -> Result<f64, OutOfRange> {
         let arm = Arm::new(self.parameters.arm)?;
-        let q = arm.inverse_tip_inertia_per_kg(&Pose::new(&theta(&at_rest(INCONSISTENT_DEG))));
+        let start = Initial::A.state(&arm, 0, 0);
+        let q = arm.inverse_tip_inertia_per_kg(&Pose::new(&theta(&start)));
         Ok(q.m11 / q.determinant())
     }
 
@@ -158,7 +157,7 @@ impl Stiffness {
         let speed_m_s = self.parameters.belt.speed_m_s(0.0);
         let failed = |source| self.failed(stiffness_n_m, source);
         let mass_kg = self.sticking_mass_kg()?;
-        let mut quiet = self.plant(None, speed_m_s, at_rest(ON_BELT_DEG), mass_kg)?;
+        let mut quiet = self.plant(None, speed_m_s, self.start(Initial::D)?, mass_kg)?;
         quiet.advance(QUIET_S, &mut ()).map_err(failed)?;
         let now = quiet.snapshot();
         let [theta, rates] = [now.theta_rad, now.theta_dot_rad_s];
@@ -191,7 +190,7 @@ impl Stiffness {
         let mut plant = self.plant(
             stiffness_n_m,
             v_belt_m_s,
-            at_rest(INCONSISTENT_DEG),
+            self.start(Initial::A)?,
             BOUNCING_MASS_KG,
         )?;
         plant.advance(transient_s, &mut ()).map_err(failed)?;
@@ -202,14 +201,14 @@ impl Stiffness {
         Ok(flights.longest_s > 1e-3)
     }
 
+    fn start(&self, initial: Initial) -> Result<State, OutOfRange> {
+        Ok(initial.state(&Arm::new(self.parameters.arm)?, 0, 0))
+    }
+
     fn failed(&self, stiffness_n_m: Option<f64>, source: painleve_plant::PlantError) -> StudyError {
         let row = stiffness_n_m.map_or("rigid".into(), |stiffness| format!("{stiffness} N/m"));
         StudyError::Plant { row, source }
     }
-}
-
-fn at_rest((theta1_deg, theta2_deg): (f64, f64)) -> State {
-    State::new(theta1_deg.to_radians(), theta2_deg.to_radians(), 0.0, 0.0)
 }
 
 /// The longest flight.

@@ -47,6 +47,8 @@ impl StudyOptions for Options {
             &[("contact", "--stiffness")],
             &["arm", "belt", "impact", "solver"],
         )?;
+        let speed_m_s = scenario.belt.profile.speed_m_s(0.0);
+        range::check("belt.profile.speed_m_s", speed_m_s, -100.0, 0.0)?;
         for &v_belt_m_s in self.v_belt.values() {
             range::check("--v-belt", v_belt_m_s, -100.0, 100.0)?;
         }

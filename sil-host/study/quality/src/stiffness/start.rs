@@ -2,8 +2,9 @@
 
 use painleve_plant::{Event, Plant, Probe, State, Step};
 use painleve_study_core::StudyError;
+use painleve_study_core::initial::Initial;
 
-use super::{INCONSISTENT_DEG, Stiffness, at_rest};
+use super::Stiffness;
 
 /// Longest first contact, s.
 const LONGEST_S: f64 = 0.1;
@@ -80,7 +81,8 @@ impl Stiffness {
         let failed = |source| self.failed(stiffness_n_m, source);
         let speed_m_s = self.parameters.belt.speed_m_s(0.0);
         let mass_kg = self.sticking_mass_kg()?;
-        let start = || self.plant(stiffness_n_m, speed_m_s, at_rest(INCONSISTENT_DEG), mass_kg);
+        let at_rest = self.start(Initial::A)?;
+        let start = || self.plant(stiffness_n_m, speed_m_s, at_rest, mass_kg);
         let mut first = FirstContact::default();
         let mut plant = start()?;
         let mut time_s = 0.0;

@@ -78,16 +78,18 @@ pub(super) const EFFECTS: &[RigEffect] = effects! {
     "mass-error": "arm_model.link_mass_kg", "of the mass, unknown", [0.05, 0.1, 0.2, 0.5], typical 0.05,
         compliant_only: false,
         overrides: Computed(|level, drawn| {
-            let mass = 0.12 * (1.0 + level.copysign(drawn.share - 0.5));
-            set!["arm_model.link_mass_kg=[{mass:?}, {mass:?}]"]
+            let factor = 1.0 + level.copysign(drawn.share - 0.5);
+            let mass_kg = drawn.arm.link_mass_kg.map(|mass_kg| mass_kg * factor);
+            set!["arm_model.link_mass_kg={mass_kg:?}"]
         });
 
     "length-error": "arm_model.link_length_m", "of the length, unknown",
         [0.01, 0.02, 0.05, 0.1], typical 0.02,
         compliant_only: false,
         overrides: Computed(|level, drawn| {
-            let length = 0.21 * (1.0 + level.copysign(drawn.share - 0.5));
-            set!["arm_model.link_length_m=[{length:?}, {length:?}]"]
+            let factor = 1.0 + level.copysign(drawn.share - 0.5);
+            let length_m = drawn.arm.link_length_m.map(|length_m| length_m * factor);
+            set!["arm_model.link_length_m={length_m:?}"]
         });
 };
 
