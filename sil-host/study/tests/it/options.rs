@@ -68,6 +68,13 @@ fn every_study_takes_the_arm_of_a_scenario_file() {
             "controller {path} with ideal converters: controller.torque_limit_nm = 40 is outside the allowed range 0 to 5"
         )
     );
+    for study in ["robustness", "lift-off", "ablation --on rigid"] {
+        let message = refusal(&format!("{study} {short}"));
+        assert_eq!(
+            message,
+            "arm.height_m has no effect here; the study sets it"
+        );
+    }
     let message = refusal("stiffness --set belt.profile.speed_m_s=0.5");
     assert!(
         message.starts_with("belt.profile.speed_m_s = 0.5 is outside"),

@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use crate::capture::{self, Capture};
 use crate::effects::{self, Contact, EffectsStudy};
-use crate::robustness::{Arms, Criterion, LiftOffRule, Robustness};
+use crate::robustness::{self, Arms, Criterion, LiftOffRule, Robustness};
 
 /// A kind of random closed loop.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, clap::ValueEnum)]
@@ -33,7 +33,7 @@ impl Condition {
     /// The keys that the condition sets in every run.
     pub fn fixed_keys(self) -> &'static [&'static str] {
         match self {
-            Self::Rigid | Self::Compliant => &[],
+            Self::Rigid | Self::Compliant => &robustness::FIXED,
             Self::Soft | Self::Hanging | Self::Patches | Self::Half => &effects::FIXED,
             Self::Capture => &capture::FIXED,
         }

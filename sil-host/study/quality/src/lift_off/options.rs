@@ -7,6 +7,7 @@ use painleve_study_core::options::{self, RandomRuns};
 use painleve_study_core::trial::Trial;
 
 use super::{LiftOff, LiftOffs, Row};
+use crate::robustness;
 
 /// Delay in detecting a lift-off, with the force cell and without.
 #[derive(Debug, Args)]
@@ -34,6 +35,7 @@ impl StudyOptions for Options {
         self.runs
             .set
             .refuse_fixed(&["controller.contact.evidence", "controller.governor.enabled"])?;
+        self.runs.set.refuse_fixed(&robustness::FIXED)?;
         let study = LiftOff {
             seed: self.runs.seed,
             runs: self.runs.runs,

@@ -34,6 +34,9 @@ pub use outcome::{Place, RobustnessOutcome};
 pub use part::Part;
 pub use row::{Criterion, Ending, Row};
 
+/// The shape of the arm, on which the study places start and target of every run.
+pub const FIXED: [&str; 2] = ["arm.link_length_m", "arm.height_m"];
+
 /// Settings of the campaign.
 #[derive(Clone, Debug)]
 pub struct Robustness {

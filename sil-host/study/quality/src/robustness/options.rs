@@ -7,7 +7,7 @@ use painleve_study_core::grid::once;
 use painleve_study_core::options::RandomRuns;
 use painleve_study_core::trial::Trial;
 
-use super::{Arms, Criterion, Part, Robustness, RobustnessOutcome, Row};
+use super::{Arms, Criterion, FIXED, Part, Robustness, RobustnessOutcome, Row};
 
 /// A campaign of random arms, belts, converters and losses that the controller does not know.
 #[derive(Debug, Args)]
@@ -33,6 +33,7 @@ impl StudyOptions for Options {
     type Outcome = RobustnessOutcome;
 
     fn study(&self) -> Result<Robustness, StudyError> {
+        self.runs.set.refuse_fixed(&FIXED)?;
         let parts = once(&self.without).into_iter().flat_map(Part::without);
         let study = Robustness {
             arms: self.arms,
