@@ -2,7 +2,7 @@
 //!
 //! Each point contributes its depth, the prior each parameter's distance from its value, both in standard deviations
 //! (Gauss–Newton, with steps halved until the sum of squares falls). The noise is what the fit leaves over, times the
-//! number of neighbours that share an error.
+//! number of neighbours that share an error, and at least the rounding of one reading.
 
 use nalgebra::SMatrix;
 use painleve_shared::Posture;
@@ -228,15 +228,22 @@ fn covariance(information: &Square, prior: &Prior) -> Square {
         .map_or(scale * scale, |it| scale * it.inverse() * scale)
 }
 
-/// Returns the noise: what is left over, times the root of the number of neighbours that share an error.
+/// Returns the noise: what is left over, times the root of the number of neighbours that share an error. It is at least that of
+/// means which round like single readings: without noise, a tip that slides to and fro, or a joint that turns back, rounds alike.
 fn noise(points: &Points, parameters: &Parameters) -> f64 {
     let places = points.points.iter().map(|point| point.place(parameters));
-    let off: Vec<f64> = places
-        .map(|place| (place.depth_m / points.deviation_m(&place)).clamp(-1e3, 1e3))
-        .collect();
+    let (off, rounding): (Vec<f64>, Vec<f64>) = places
+        .map(|place| {
+            let share = |it_m: f64| it_m / points.deviation_m(&place);
+            let off = share(place.depth_m).clamp(-1e3, 1e3);
+            (off, share(points.rounding_m(&place)))
+        })
+        .unzip();
+    let square = |of: &[f64]| of.iter().map(|it| it * it).sum::<f64>();
     let freedom = off.len().saturating_sub(COUNT).max(1);
-    let variance = off.iter().map(|it| it * it).sum::<f64>() / freedom as f64;
-    libm::sqrt(variance * sharing(&off)).max(LEAST_NOISE)
+    let variance = square(&off) / freedom as f64 * sharing(&off);
+    let least = square(&rounding) / rounding.len().max(1) as f64;
+    libm::sqrt(variance.max(least)).max(LEAST_NOISE)
 }
 
 /// Returns the number of neighbours in a series that share an error: one and twice the sum of its correlations, up to the first

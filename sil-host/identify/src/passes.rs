@@ -188,7 +188,7 @@ impl Points {
     }
 
     /// Returns the standard deviation of the depth at a point by rounding, m.
-    fn rounding_m(&self, place: &Place) -> f64 {
+    pub(crate) fn rounding_m(&self, place: &Place) -> f64 {
         let [by_1, by_2] = place.depth_by_joint;
         self.count_rad / libm::sqrt(12.0) * libm::hypot(by_1, by_2)
     }

@@ -25,6 +25,10 @@ pub struct Rig {
     pub waves_m: f64,
     /// One count of its encoders, rad.
     pub count_rad: f64,
+    /// Largest noise of its encoders, rad.
+    pub noise_rad: f64,
+    /// Amplitude of the belt's unevenness, m.
+    pub uneven_m: f64,
     pub generator: Pcg64,
 }
 
@@ -61,6 +65,8 @@ impl Rig {
             prior: measured.prior(nominal),
             waves_m: 0.0,
             count_rad: COUNT_RAD,
+            noise_rad: 1e-4,
+            uneven_m: 2e-5,
             generator,
         }
     }
@@ -89,6 +95,8 @@ impl Rig {
             prior,
             waves_m: 0.0,
             count_rad: COUNT_RAD,
+            noise_rad: 1e-4,
+            uneven_m: 2e-5,
             generator,
         }
     }
@@ -117,14 +125,14 @@ impl Rig {
 
     /// Returns the reading of a tip on the belt, raised by this much, m.
     pub fn reading(&mut self, posture: Posture, tip_t_m: f64, raised_m: f64) -> Reading {
-        // Uneven by ± 20 µm, over some centimetres.
-        let uneven_m = 2e-5 * (tip_t_m / 0.012).sin();
+        // Over some centimetres.
+        let uneven_m = self.uneven_m * (tip_t_m / 0.012).sin();
         let mut here = self.actual;
         let height = here.get(Parameter::Height);
         here.set(Parameter::Height, height + uneven_m - raised_m);
         let exact = angles(&here, posture, tip_t_m);
         let rounded = exact.map(|angle| {
-            let noise = self.generator.random_range(-1e-4..1e-4);
+            let noise = self.noise_rad * self.generator.random_range(-1.0..1.0);
             ((angle + noise) / self.count_rad).round() * self.count_rad
         });
         Reading {
