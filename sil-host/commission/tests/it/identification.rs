@@ -15,6 +15,7 @@ use painleve_identify::torques::{Estimate, Joint, Joints};
 use painleve_identify::{Parameter, Reading};
 use painleve_plant::Plant;
 use painleve_plant::mechanics::BuiltInPlant;
+use painleve_plant::mechanics::compliant::ContactKind;
 use painleve_plant::scenario::Scenario;
 use painleve_shared::Posture;
 use painleve_shared::counts::TorqueCounts;
@@ -184,6 +185,18 @@ fn a_spring_that_rests_elsewhere_is_told_from_one_that_is_stiffer() {
     assert!(!first.has_offset() && elbow.has_offset(), "{found:?}");
     let farther_rad = elbow.rest_error_rad().unwrap();
     assert!((farther_rad - 0.05).abs() < 0.01, "{farther_rad}");
+}
+
+/// Torques act some ticks after the readings that they answer.
+#[test]
+fn friction_is_not_told_better_than_the_delay_of_the_torques_allows() {
+    let scenario = Scenario::default();
+    let mut actual = imperfect(&scenario, 51_004).unwrap();
+    actual.contact.kind = ContactKind::Rigid;
+    actual.effects = scenario.effects.clone();
+    let mut rig = SimulatedSlides::new(actual.clone(), None);
+    let found = identify_arm(&mut rig, &scenario, &drawn()).unwrap();
+    assert_joints_found(&actual, &found.joints);
 }
 
 /// The zeros of both cells have drifted by 5 % of the force in the slides.

@@ -39,6 +39,10 @@ const TILT_RAD: f64 = 0.04;
 /// Part of a result that is always assumed to be wrong: at the low speed of a slide, friction is a little more than Coulomb's.
 const ALWAYS: f64 = 0.02;
 
+/// Part of the torques by which a friction is always assumed to be wrong: they act some ticks after the readings that they
+/// answer, and change meanwhile if a joint turns, with the direction of its turn, as friction does.
+const ALWAYS_FRICTION: f64 = 0.0003;
+
 /// Part of the torques by which an offset is always assumed to be wrong: slides hardly tell it from the belt's tilt.
 const ALWAYS_OFFSET: f64 = 0.005;
 
@@ -211,6 +215,12 @@ impl Joints {
             value,
             deviation: libm::hypot(deviation, ALWAYS * value),
         };
+        // What is known of friction and offset beforehand is the size of the torques.
+        let torque_nm = deviations[OFFSET];
+        let always = |estimate: Estimate, part: f64| Estimate {
+            deviation: libm::hypot(estimate.deviation, part * torque_nm),
+            ..estimate
+        };
         let joint = |joint: usize| {
             let unit = |index: usize| solution.unit(OF_JOINT * joint + index);
             let friction = solution.sum(&unit(FRICTION));
@@ -220,17 +230,10 @@ impl Joints {
             let gain = 1.0 / (1.0 + commanded.value);
             let offset = solution.sum(&unit(OFFSET));
             Joint {
-                friction_nm: assured(friction.value, friction.deviation),
+                friction_nm: always(assured(friction.value, friction.deviation), ALWAYS_FRICTION),
                 stiffness_nm_rad: assured(nominal + stiffness.value, stiffness.deviation),
                 gain: assured(gain, commanded.deviation * gain * gain),
-                offset_nm: Estimate {
-                    deviation: libm::hypot(
-                        assured(offset.value, offset.deviation).deviation,
-                        // What is known of an offset beforehand is the size of the torques.
-                        ALWAYS_OFFSET * deviations[OF_JOINT * joint + OFFSET],
-                    ),
-                    ..offset
-                },
+                offset_nm: always(assured(offset.value, offset.deviation), ALWAYS_OFFSET),
             }
         };
         let tilt = solution.sum(&solution.unit(BELT));
@@ -250,8 +253,7 @@ impl Joints {
                 ..tilt
             },
             left_over_nm: (!equations.is_empty()).then(|| [rms(&before), rms(&solution.unknowns)]),
-            // What is known of an offset beforehand is the size of the torques.
-            torque_nm: deviations[OFFSET],
+            torque_nm,
         }
     }
 }
