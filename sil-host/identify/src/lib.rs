@@ -47,6 +47,10 @@ const LIMITED: f64 = 0.97;
 /// deviations of what their torques show are several times as large, and with 0.65 or more, values are wrong by more than those.
 const MOST_LIMITED: f64 = 0.1;
 
+/// Least number of readings of which [`MOST_LIMITED`] is a share, as a part of a whole slide's: what throws a tip ends its slide,
+/// and takes the torques to their limit for some ticks.
+const LEAST_LIMITED_OF: f64 = 0.1;
+
 /// Readings of one tick of a slide.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Reading {
@@ -96,7 +100,8 @@ impl Slide {
         let is_limited =
             |it: &&Reading| it.torque_nm.iter().any(|nm| nm.abs() >= LIMITED * limit_nm);
         let limited = self.readings.iter().filter(is_limited).count();
-        let share = limited as f64 / self.readings.len().max(1) as f64;
+        let least = LEAST_LIMITED_OF * self.whole as f64;
+        let share = limited as f64 / least.max(self.readings.len() as f64).max(1.0);
         if share > MOST_LIMITED {
             return Err(Refusal::TorqueLimit {
                 slide: index,

@@ -30,6 +30,29 @@ fn a_torque_limit_that_is_too_low_is_named_before_all_that_follows_from_it() {
     }
 }
 
+/// Coarse encoders shake this arm of 7 kg and throw its tip, and its torques reach their limits until the slide ends.
+#[test]
+fn torques_of_a_tip_that_is_thrown_are_no_limit_that_is_too_low() {
+    let heavy = [
+        "arm.link_length_m=[0.6,0.5]",
+        "arm.height_m=0.95",
+        "arm.link_mass_kg=[4,3]",
+        "arm.stiffness_nm_rad=[0,0]",
+        "converters.torque.range_nm=60",
+        "converters.force.range_n=100",
+        "controller.torque_limit_nm=40",
+        "initial={ tip_m=0.0, elbow='down' }",
+    ];
+    let scenario = Scenario::default()
+        .with_overrides("heavy", &heavy.map(String::from))
+        .unwrap();
+    for seed in [6, 7, 10] {
+        let (found, _) = identified(&scenario, seed, None);
+        let refusal = found.map(|_| ()).unwrap_err();
+        assert!(refusal.contains("18 N or more"), "{seed}: {refusal}");
+    }
+}
+
 /// Zeros that are wrong by almost 3° lift a tip that presses with 4 N only.
 #[test]
 #[ignore = "a long identification"]
