@@ -8,6 +8,9 @@ use crate::parameters::{JOINT_NAMES, Parameter};
 /// Share of the readings up to which friction counts as always against the belt, %.
 const ALWAYS_AGAINST: f64 = 10.0;
 
+/// What makes an arm press too hard, or throws it. A count of the encoders of a long, heavy arm is a large force.
+const OF_ARM: &str = "controller.torque_limit_nm, the masses and springs that the scenario gives for the arm, and converters.encoder.bits: the heavier an arm, the more its torques shake it with coarse encoders";
+
 /// A motion that is missing.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Missing {
@@ -43,7 +46,7 @@ fn advice(missing: Option<&Missing>, off_mm: f64) -> String {
     missing.map_or_else(
         || {
             format!(
-                "they go far enough, but shake too much, {off_mm:.2} mm off a line, root mean square; check the belt's waves and vibration, its seam, and play in the joints"
+                "they go far enough, but shake too much, {off_mm:.2} mm off a line, root mean square; check the belt's waves and vibration, its seam, play in the joints, and converters.encoder.bits"
             )
         },
         Missing::to_string,
@@ -89,7 +92,7 @@ pub enum Refusal {
     },
     /// The tip pressed too hard, and the slide was ended.
     #[error(
-        "slide {}: the tip pressed on the belt with {most_n:.0} N or more, and the torque was taken off; see what it catches on, and check the masses and springs that the scenario gives for the arm",
+        "slide {}: the tip pressed on the belt with {most_n:.0} N or more, and the torque was taken off; see what it catches on, and check {OF_ARM}",
         .slide + 1
     )]
     PressedTooHard {
@@ -100,7 +103,7 @@ pub enum Refusal {
     },
     /// The tip moved too fast, and the slide was ended.
     #[error(
-        "slide {}: the tip moved faster than {most_m_s} m/s, and the torque was taken off; see whether the tip is on the belt and what throws it, and check controller.torque_limit_nm and the masses and springs that the scenario gives for the arm",
+        "slide {}: the tip moved faster than {most_m_s} m/s, and the torque was taken off; see whether the tip is on the belt and what throws it, and check {OF_ARM}",
         .slide + 1
     )]
     MovedTooFast {
@@ -122,7 +125,7 @@ pub enum Refusal {
     },
     /// The torque did not suffice.
     #[error(
-        "slide {}: a torque was at its limit (controller.torque_limit_nm = {limit_nm}) in {percent:.0} % of the readings, so that the tip did not slide as it should; raise it to what the stages surely give",
+        "slide {}: a torque was at its limit (controller.torque_limit_nm = {limit_nm}) in {percent:.0} % of the readings, so that the tip did not slide as it should; raise it to what the stages surely give, or take stronger stages",
         .slide + 1
     )]
     TorqueLimit {
@@ -135,7 +138,7 @@ pub enum Refusal {
     },
     /// The tip was in the air.
     #[error(
-        "slide {}: the tip was on the belt in only {percent:.0} % of the readings (f_n of {contact_n} N or more); press it down, and check the force cell and controller.torque_limit_nm",
+        "slide {}: the tip was on the belt in only {percent:.0} % of the readings (f_n of {contact_n} N or more); see what holds or throws it, and check the force cell, {OF_ARM}",
         .slide + 1
     )]
     NotOnBelt {
@@ -208,7 +211,7 @@ pub enum Refusal {
     },
     /// The tip is not on a line.
     #[error(
-        "the tip does not stay on a straight line: {off_mm:.2} mm off, root mean square, where {most_mm:.2} mm are allowed; check for play in the joints, a loose magnet, an uneven belt, and a tip that is not on it"
+        "the tip does not stay on a straight line: {off_mm:.2} mm off, root mean square, where {most_mm:.2} mm are allowed; check for play in the joints, a loose magnet, an uneven belt, a tip that is not on it, slides of different arms, and too few converters.encoder.bits"
     )]
     NotALine {
         /// Distance, mm.
@@ -228,7 +231,7 @@ pub enum Refusal {
     },
     /// A result contradicts what is known.
     #[error(
-        "{parameter}: {found:.4}{} by the slides, but {known:.4} ± {deviation:.4} is known beforehand: a link is bent or has another length than told, the belt is elsewhere, or a zero has been taken wrongly",
+        "{parameter}: {found:.4}{} by the slides, but {known:.4} ± {deviation:.4} is known beforehand: a link is bent or has another length than told (link_length_m, --link-1-m), the belt is elsewhere (height_m), or a zero has been taken wrongly (converters.encoder.offset_counts)",
         .parameter.unit_after_number()
     )]
     Contradicts {

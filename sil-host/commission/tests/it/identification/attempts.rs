@@ -50,6 +50,7 @@ fn torques_of_a_tip_that_is_thrown_are_no_limit_that_is_too_low() {
         let (found, _) = identified(&scenario, seed, None);
         let refusal = found.map(|_| ()).unwrap_err();
         assert!(refusal.contains("18 N or more"), "{seed}: {refusal}");
+        assert!(refusal.contains("converters.encoder.bits"), "{refusal}");
     }
 }
 
