@@ -23,8 +23,8 @@ pub enum ExportError {
     Incomplete(#[source] Damage),
     /// The record is damaged behind whole ticks.
     #[error(
-        "it is damaged after {whole_bytes} bytes: {reason}; with --csv --recover, the {rows} ticks before are exported, up to \
-         {end_s} s"
+        "it is damaged after {whole_bytes} bytes: {reason}; painleve export --csv --recover exports the {rows} ticks \
+         before, up to {end_s} s"
     )]
     Damaged {
         /// What is wrong.

@@ -95,7 +95,7 @@ fn what_cannot_be_compared_is_named() {
         (&["compare", "a.mcap", "missing.mcap"], "missing.mcap"),
         (
             &["compare", "a.mcap", "cut.mcap"],
-            "with --csv --recover, the ",
+            "painleve export --csv --recover exports the ",
         ),
         (
             &["compare", "a.mcap", "a.csv", "--html", "a.csv"],

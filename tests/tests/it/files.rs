@@ -369,7 +369,7 @@ fn damaged_records_are_refused_and_what_is_whole_is_recovered() {
         let output = bench.run(&["export", name, "--csv", "x.csv"]);
         assert_eq!(code(output.status), 2, "{output:?}");
         assert!(
-            errors(&output).contains("with --csv --recover, the "),
+            errors(&output).contains("painleve export --csv --recover exports the "),
             "{output:?}"
         );
         assert!(!bench.path("x.csv").exists());
