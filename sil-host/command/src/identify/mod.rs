@@ -107,13 +107,13 @@ pub fn run(arguments: &IdentifyArguments) -> Result<(), CommandError> {
         arguments.seed,
     )?;
     let mut scenario = Scenario::load(&arguments.scenario, &arguments.overrides)?;
-    recorded::check_distinct(&arguments.slide)?;
     let recorded: Result<Vec<_>, _> = arguments
         .slide
         .iter()
         .map(|it| it.read(&scenario))
         .collect();
     let slides = recorded?;
+    recorded::check_distinct(&arguments.slide, &slides)?;
     let output_path = arguments.output.clone();
     let output_path =
         output_path.unwrap_or_else(|| default_output(arguments.rehearse, "identified"));

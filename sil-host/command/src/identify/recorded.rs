@@ -128,16 +128,18 @@ impl Recorded {
     }
 }
 
-/// Checks that each file is given once: a slide that counts twice would seem to be known better.
+/// Checks that each slide is given once, whatever its file: one that counts twice would seem to be known better.
 ///
 /// # Errors
-/// [`InputError::Slide`] for a file that is given again.
-pub fn check_distinct(slides: &[Recorded]) -> Result<(), InputError> {
+/// [`InputError::Slide`] for a slide that is given again.
+pub fn check_distinct(given: &[Recorded], slides: &[Slide]) -> Result<(), InputError> {
     for (index, slide) in slides.iter().enumerate() {
-        if slides[..index].iter().any(|it| it.path == slide.path) {
+        let is_same = |it: &Slide| !it.readings.is_empty() && it.readings == slide.readings;
+        if let Some(earlier) = slides[..index].iter().position(is_same) {
+            let other = given[earlier].path.display();
             return Err(InputError::Slide {
-                path: slide.path.clone(),
-                reason: "it is given twice".into(),
+                path: given[index].path.clone(),
+                reason: format!("it is the slide of {other}; give each slide once"),
             });
         }
     }
@@ -202,6 +204,7 @@ fn of_table(table: impl Read) -> Result<Vec<SlideTick>, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use painleve_shared::Posture;
 
     #[test]
     fn a_table_gives_the_frames_of_the_ticks_that_track_or_have_lost_the_belt() {
@@ -240,6 +243,20 @@ mod tests {
             wrong.unwrap_err(),
             "sensor.joint2_counts = \"x\" is not a whole number"
         );
+    }
+
+    #[test]
+    fn a_slide_that_is_given_again_is_refused_whatever_its_file() {
+        let of = |counts: u32| {
+            let table = format!("{}\n{counts},2,3,7,1,1\n", COLUMNS.join(","));
+            let ticks = of_table(table.as_bytes()).unwrap();
+            slide_of(&Scenario::default(), Posture::ElbowDown, ticks, 1)
+        };
+        let given = ["elbow-down=a.mcap", "elbow-up=b.csv"].map(|it| it.parse().unwrap());
+        let refused = |slides: [Slide; 2]| check_distinct(&given, &slides).err();
+        assert!(refused([of(1), of(4)]).is_none());
+        let same = refused([of(1), of(1)]).unwrap().to_string();
+        assert!(same.contains("b.csv: it is the slide of a.mcap"), "{same}");
     }
 
     #[test]
