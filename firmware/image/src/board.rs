@@ -55,6 +55,9 @@ pub trait Board {
     const NAME: &'static str;
 
     /// Starts clocks, pins and peripherals in bounded time.
+    ///
+    /// # Errors
+    /// [`StartFault`]; the torque is off.
     fn start(device: Self::Device, core: cortex_m::Peripherals) -> Result<Parts<Self>, StartFault>
     where
         Self: Sized;

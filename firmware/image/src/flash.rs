@@ -80,11 +80,9 @@ impl<R: FlashRegisters> ReadNorFlash for ConfigurationFlash<R> {
     fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), NorFlashErrorKind> {
         check_read(self, offset, bytes.len())?;
         self.0.reading(|| {
-            let mut address = R::START + offset;
-            for byte in bytes {
+            for (address, byte) in (R::START + offset..).zip(bytes) {
                 // SAFETY: `check_read` has found the address within the slots, which are mapped to memory.
                 *byte = unsafe { (address as *const u8).read_volatile() };
-                address += 1;
             }
         });
         Ok(())

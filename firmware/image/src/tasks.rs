@@ -32,7 +32,7 @@ pub const ANSWERS: usize = 4;
 /// Length of the queue of events for the log, one more than may wait.
 pub const EVENTS: usize = 8;
 
-/// How long a host that watches an arm may be silent, ms. It sends [`Request::Alive`] more often.
+/// How long a host that watches an arm may be silent, ms. It sends [`Alive`](painleve_shared::message::Request::Alive) more often.
 pub const SENSORS_SILENCE_MS: u32 = 200;
 
 /// How long a host whose frames are awaited may be silent, ms. No torque depends on it.

@@ -29,7 +29,7 @@ impl<I: Deref<Target = RegisterBlock>> SpiWords for SpiPort<I> {
             let _ = self.0.sr().read();
             return Some(Err(Overrun));
         }
-        Some(Ok(word as u16))
+        Some(Ok(word))
     }
 
     fn discard(&mut self) {

@@ -25,14 +25,16 @@ pub fn watch(
     interrupts: &mut NVIC,
     watchdog: &Independent,
 ) -> Result<(), StartFault> {
+    const BELOW_2_9_V: u8 = 7;
     lines.rtsr().modify(|_, w| w.tr16().set_bit());
     lines.imr().modify(|_, w| w.mr16().set_bit());
     // The lines already wait for the edge of a supply that falls meanwhile.
+    // SAFETY: PWR_CR: a threshold.
     power
         .cr()
-        .modify(|_, w| unsafe { w.pls().bits(7) }.pvde().set_bit());
+        .modify(|_, w| unsafe { w.pls().bits(BELOW_2_9_V) }.pvde().set_bit());
     // SAFETY: the handler takes the torque off and shares nothing; its priority is the highest, which
-    // no critical section masks.
+    // no lock of a task's resource masks.
     unsafe {
         interrupts.set_priority(pac::Interrupt::PVD, 0);
         NVIC::unmask(pac::Interrupt::PVD);

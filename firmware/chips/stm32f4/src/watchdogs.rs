@@ -21,7 +21,7 @@ impl IndependentWatchdog for Independent {
         // SAFETY: every value of three bits up to 6 is a prescaler, and of twelve bits a reload.
         unsafe {
             self.0.pr().write(|w| w.bits(limit.prescaler.into()));
-            self.0.rlr().write(|w| w.bits(limit.reload.into()));
+            self.0.rlr().write(|w| w.bits(limit.reload));
         }
     }
 

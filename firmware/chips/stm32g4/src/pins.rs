@@ -137,8 +137,8 @@ impl Output {
         } else {
             self.number + 16
         };
-        // SAFETY: sets or clears this pin only.
         let set = self.port.registers().bsrr();
+        // SAFETY: sets or clears this pin only.
         set.write(|w| unsafe { w.bits(1 << bit) });
     }
 }

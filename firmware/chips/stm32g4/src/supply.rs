@@ -34,7 +34,7 @@ pub fn watch(
         .cr2()
         .modify(|_, w| unsafe { w.pvdls().bits(BELOW_2_9_V) }.pvde().set_bit());
     // SAFETY: the handler takes the torque off and shares nothing; its priority is the highest, which
-    // no critical section masks.
+    // no lock of a task's resource masks.
     unsafe {
         interrupts.set_priority(pac::Interrupt::PVD_PVM, 0);
         NVIC::unmask(pac::Interrupt::PVD_PVM);
