@@ -4,7 +4,7 @@
 //! Each axis is a differential pair, the amplifier's output against its ground, with a live zero: without a
 //! force, the output is at half the reference. A dead supply, an open or shorted wire and a dead converter
 //! therefore give a code that no force gives. The converter runs on 4.5 to 5.5 V: its inputs need a level
-//! shifter (74AHCT125), and its output needs a pin that tolerates 5 V.
+//! shifter (74AHCT125), and its output needs a divider to the pin's 3.3 V.
 
 use painleve_shared::counts::ForceCounts;
 use painleve_shared::mounting::{Mounting, SensorParts};

@@ -4,7 +4,7 @@
 //! late by a whole buffer: 11 ms at 921,600 baud.
 
 use core::marker::PhantomData;
-use core::sync::atomic::{AtomicU8, Ordering};
+use core::sync::atomic::{AtomicU8, Ordering, compiler_fence};
 
 use heapless::spsc::{Consumer, Producer, Queue};
 
@@ -121,6 +121,8 @@ impl<R: DmaRegisters> DmaBytes<R> {
 impl<R: DmaRegisters> Port for DmaPort<R> {
     fn receive(&mut self, buffer: &mut [u8]) -> usize {
         let filled = RECEIVED.saturating_sub(R::bytes_to_end());
+        // Keeps the loads of the bytes after that of their number.
+        compiler_fence(Ordering::Acquire);
         let mut length = 0;
         for place in buffer {
             let waiting = self.received.get(self.taken);

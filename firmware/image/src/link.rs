@@ -113,7 +113,9 @@ pub fn link<D, L, P, F>(
                     *awaits_answer = true;
                     continue;
                 }
-                Ok(Request::Configure { build, .. }) if build != Configuration::<L>::BUILD => {
+                Ok(Request::Configure { build, .. } | Request::Store { build, .. })
+                    if build != Configuration::<L>::BUILD =>
+                {
                     control.lock(|control| control.task.stop());
                     Response::OtherBuild {
                         build: Configuration::<L>::BUILD,
@@ -131,12 +133,6 @@ pub fn link<D, L, P, F>(
                     stop(&mut control);
                     configure(&mut control, decoded, configuration, source)
                         .unwrap_or_else(|refusal| refusal)
-                }
-                Ok(Request::Store { build, .. }) if build != Configuration::<L>::BUILD => {
-                    control.lock(|control| control.task.stop());
-                    Response::OtherBuild {
-                        build: Configuration::<L>::BUILD,
-                    }
                 }
                 Ok(Request::Store { configuration, .. }) => {
                     stop(&mut control);
