@@ -32,7 +32,7 @@ typedef struct PainleveController PainleveController;
 // A plant with its converters.
 typedef struct PainlevePlant PainlevePlant;
 
-// Sensor frame of one tick.
+// Sensor frame of one tick. docs/interface.md, *Layouts*, has the scale and the sign of each count.
 typedef struct {
   // Tick; wraps at 2^32.
   uint32_t tick;
@@ -54,7 +54,7 @@ typedef struct {
 typedef struct {
   // Tick of the answered sensor frame.
   uint32_t tick;
-  // Number of the answered sensor frame.
+  // Number of the answer; wraps at 2^32.
   uint32_t sequence;
   // Torques of both joints, counts.
   int32_t torques[2];

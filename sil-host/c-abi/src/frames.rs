@@ -4,7 +4,7 @@ use painleve_plant::Snapshot;
 use painleve_shared::counts::{EncoderCounts, ForceCounts, Micrometres, TorqueCounts};
 use painleve_shared::frame::{ActuatorFrame, DigitalInputs, SensorFrame, StatusFlags};
 
-/// Sensor frame of one tick.
+/// Sensor frame of one tick. docs/interface.md, *Layouts*, has the scale and the sign of each count.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default)]
 pub struct PainleveSensorFrame {
@@ -30,7 +30,7 @@ pub struct PainleveSensorFrame {
 pub struct PainleveActuatorFrame {
     /// Tick of the answered sensor frame.
     pub tick: u32,
-    /// Number of the answered sensor frame.
+    /// Number of the answer; wraps at 2^32.
     pub sequence: u32,
     /// Torques of both joints, counts.
     pub torques: [i32; 2],
