@@ -19,7 +19,7 @@ const CORE_HZ: f32 = 64e6;
 fn main() -> ! {
     let configuration = Configuration::default();
     let mut task: ControlTask<Arm> = ControlTask::new(Arm::default());
-    let accepted = task.configure(&configuration, FrameSource::Realtime);
+    let accepted = task.configure(&configuration, FrameSource::Sensors);
     if let (Ok(()), Some(mut core)) = (accepted, cortex_m::Peripherals::take()) {
         // After a reset the timer may count another clock, from any value.
         core.SYST.set_clock_source(SystClkSource::Core);

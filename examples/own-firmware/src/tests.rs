@@ -23,7 +23,7 @@ impl Bench {
     fn new() -> Self {
         let configuration = Configuration::default();
         let mut task = ControlTask::new(Arm::default());
-        task.configure(&configuration, FrameSource::Realtime)
+        task.configure(&configuration, FrameSource::Sensors)
             .expect("valid");
         let encoder = configuration.converters.encoders[0];
         let [theta1, theta2] = [-11.4_f64, -35.1].map(f64::to_radians);
