@@ -62,7 +62,7 @@ fn an_update_that_is_due_is_done_before_the_next_answer() {
     }
 }
 
-/// Searches for edges and learning used to wait for ticks with odd or even numbers.
+/// Neither the search for edges nor learning waits for ticks with odd or even numbers.
 #[test]
 fn what_is_learnt_does_not_depend_on_the_numbers_of_the_ticks() {
     let after = |number: fn(u32) -> u32| {

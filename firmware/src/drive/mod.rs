@@ -47,7 +47,7 @@ pub trait Drive {
     /// repeating the same answer changes nothing.
     fn actuate(&mut self, answer: &ActuatorFrame);
 
-    /// Does what a tick needs not do before its torque is out. Nothing by default.
+    /// Does what a tick need not do before its torque is out. Nothing by default.
     fn end_tick(&mut self) {}
 
     /// Returns whether the next tick should have begun already, without side effects.

@@ -24,8 +24,8 @@ use super::response::AVERAGING_S;
 /// average of innovations, a change of the innovation. A sudden change of μ is not noise: counted as such, it would hide the next
 /// one. No campaign shows the need for the last one; a test does.
 const NO_NOISE_SQUARE: f32 = 16.0;
-/// The same, eight, of a single reading: of another μ or, below the estimate, of a tip that may stick. This one threshold did as
-/// well as the rules it replaced (lab book, *Parts of the friction estimate left out*).
+/// The same, eight, of a single reading: of another μ or, below the estimate, of a tip that may stick. A rule for each did no
+/// better (lab book, *Parts of the friction estimate left out*).
 const DIFFERENT_SQUARE: f32 = 4.0 * NO_NOISE_SQUARE;
 
 /// Fraction of the estimated friction that indicates a slip in the opposite direction.
