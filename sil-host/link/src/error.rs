@@ -185,9 +185,9 @@ pub enum FolderError {
     /// It belongs to another user.
     #[error("it belongs to user {0}")]
     Foreign(u32),
-    /// Names of shared memory contain its name.
-    #[error("its name is too long for shared memory")]
-    NameTooLong,
+    /// The paths of files below it would be refused by iceoryx2.
+    #[error("its path is too long or not ASCII")]
+    UnusablePath,
 }
 
 fn holder(process: Option<u32>) -> String {

@@ -44,6 +44,10 @@ const ANSWERING: &str = "answering";
 const LOCK: &str = "lock";
 /// Longest wait for a repair that removes the lock file. It takes milliseconds.
 const REPAIR_PATIENCE: Duration = Duration::from_secs(1);
+/// Longest path of iceoryx2.
+const LONGEST_PATH: usize = 255;
+/// Most that it adds to a run's folder and prefix: `/nodes/`, 30 digits, `/`, a hash of 40 digits, `.service_tag`.
+const LONGEST_ENDING: usize = 90;
 /// Length of a run's random name in letters and digits: 71 bits, which cannot be guessed.
 const NAME_LENGTH: usize = 12;
 
@@ -84,8 +88,11 @@ impl RunFiles {
     pub(super) fn config(&self) -> Result<Config, LinkError> {
         let refuse = || LinkError::Folder {
             folder: self.folder.clone(),
-            source: FolderError::NameTooLong,
+            source: FolderError::UnusablePath,
         };
+        if self.folder.as_os_str().len() + self.prefix.len() + LONGEST_ENDING > LONGEST_PATH {
+            return Err(refuse());
+        }
         let mut config = Config::default();
         config.global.prefix = FileName::new(self.prefix.as_bytes()).map_err(|_| refuse())?;
         let folder = self.folder.to_str().ok_or_else(refuse)?;

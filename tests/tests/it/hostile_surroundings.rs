@@ -414,6 +414,25 @@ fn a_runtime_folder_of_another_user_is_not_used() {
 }
 
 #[test]
+fn a_runtime_folder_that_iceoryx2_cannot_use_is_refused_by_its_path() {
+    let bench = Bench::new("odd-runtime");
+    for name in ["ü", &"long".repeat(30)] {
+        let folder = bench.path(name);
+        fs::create_dir(&folder).unwrap();
+        fs::set_permissions(&folder, fs::Permissions::from_mode(0o700)).unwrap();
+        let mut run = bench.command(&[&["run"], &SHORT[..]].concat());
+        let output = run.env("XDG_RUNTIME_DIR", &folder).output().unwrap();
+        assert_eq!(code(output.status), 3, "{output:?}");
+        let message = errors(&output);
+        assert!(
+            message.contains(&format!("{name}/painleve/"))
+                && message.contains("its path is too long or not ASCII; set XDG_RUNTIME_DIR"),
+            "{message}"
+        );
+    }
+}
+
+#[test]
 fn the_watchdog_removes_the_torque_of_a_plant_without_commands() {
     let bench = Bench::new("watchdog");
     // With this frame loss, 10 ticks without a command soon occur.
