@@ -50,7 +50,9 @@ pub enum TableError {
     #[error("{0}: the time is not later than the one before")]
     Order(String),
     /// The run is too long.
-    #[error("it has more than {MOST_TICKS} ticks or lift-offs")]
+    #[error(
+        "it has more than {MOST_TICKS} ticks or lift-offs, the most that is compared: record shorter runs"
+    )]
     TooLong,
 }
 
