@@ -9,7 +9,7 @@ use painleve_shared::{Real, Slip, settings};
 
 use crate::estimate::friction::FrictionEstimate;
 
-/// Error of the tip's velocity, m/s: slower, it is at rest.
+/// Error of the tip's velocity, m/s: slower, it is at rest. Half and twice of it lost more runs (lab book, *Factors on constants*).
 pub const BOUND_ERROR_M_S: f32 = 0.01;
 
 settings! {

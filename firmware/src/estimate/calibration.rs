@@ -6,7 +6,7 @@
 
 use painleve_shared::{Arm, Real, settings};
 
-/// Longest averaging time, s.
+/// Longest averaging time, s. A tenth and a hundred times of it lost more runs (lab book, *Factors on constants*).
 const AVERAGING_S: f32 = 2.0;
 
 settings! {

@@ -16,7 +16,8 @@ use crate::estimate::ContactEstimate;
 use crate::estimate::model::Model;
 use crate::schedule::Turn;
 
-/// Largest disturbance of either link, as a part of the largest torque.
+/// Largest disturbance of either link, as a part of the largest torque. Half and two and a half times of it lose no run (lab book,
+/// *Factors on constants*).
 const LARGEST: f32 = 0.2;
 
 settings! {

@@ -33,9 +33,11 @@ settings! {
 
 /// Averaging time of the correlation and of the friction coefficient, s.
 pub const AVERAGING_S: f32 = 0.25;
-/// Number of standard deviations from the estimated response to its bounds.
+/// Number of standard deviations from the estimated response to its bounds. With four more runs were lost (lab book, *Constants
+/// merged*).
 const DEVIATIONS: f32 = 3.0;
-/// Lower bound of the response above which the contact is taken to be rigid, and the observers have their full gain.
+/// Lower bound of the response above which the contact is taken to be rigid, and the observers have their full gain. With 0.35
+/// more runs were lost, with 0.75 the torque was noisier by a quarter (lab book, *Factors on constants*).
 const RIGID: f32 = 0.5;
 /// Part of what the contact allows that each loop through it takes. They add up: friction observer, disturbance estimate,
 /// integral of the force. Equal parts kept as many runs as unequal ones, and more on a hanging belt (lab book, *Constants that
