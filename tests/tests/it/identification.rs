@@ -239,7 +239,7 @@ fn records_of_slides_show_an_arm() {
     let twice = [&line[..], &["--slide", &slides[0]]].concat();
     let twice = bench.run(&twice);
     assert!(
-        errors(&twice).contains("it is given twice"),
+        errors(&twice).contains("it is the slide of elbow-down.mcap; give each slide once"),
         "{}",
         errors(&twice)
     );
