@@ -3,7 +3,7 @@
 use core::ops::Range;
 
 use painleve_plant::scenario::Scenario;
-use painleve_shared::{Arm, ArmParameters, Posture};
+use painleve_shared::{Arm, Posture};
 use painleve_study_core::StudyError;
 use painleve_study_core::case;
 use rand::rngs::ChaCha8Rng;
@@ -34,8 +34,14 @@ impl EffectsStudy {
         } else {
             Posture::ElbowUp
         };
-        let mut drawn = Drawn {
-            arm: ArmParameters::default(),
+        let belt = [
+            format!("belt.friction={friction:?}"),
+            format!("belt.profile={{ kind = 'constant', speed_m_s = {speed_m_s:?} }}"),
+        ];
+        let converters = place.controller.usual_converters();
+        let mut scenario = case::scenario(place.controller, posture, converters, &belt)?;
+        let drawn = Drawn {
+            arm: scenario.arm,
             friction,
             speed_m_s,
             at_s: draw(0.8..3.0),
@@ -44,13 +50,6 @@ impl EffectsStudy {
             seed: draw(0.0..9e15) as u64,
         };
         let noise_seed = draw(0.0..9e15) as u64;
-
-        let belt = [
-            format!("belt.friction={friction:?}"),
-            format!("belt.profile={{ kind = 'constant', speed_m_s = {speed_m_s:?} }}"),
-        ];
-        let converters = place.controller.usual_converters();
-        let mut scenario = case::scenario(place.controller, posture, converters, &belt)?;
         let (effect, level) = (place.effect, place.level);
         scenario.name = format!("{}-{level}-{}-{run}", effect.name, self.seed);
         scenario.run.seed = noise_seed;
@@ -58,7 +57,6 @@ impl EffectsStudy {
             Contact::Rigid => Vec::new(),
             Contact::Compliant => vec!["contact.kind=compliant".to_owned()],
         };
-        drawn.arm = scenario.arm;
         overrides.extend(effect.overrides(level, &drawn));
         // What the effect does not change of the controller's model is this arm's.
         if overrides.iter().any(|text| text.starts_with("arm_model.")) {
