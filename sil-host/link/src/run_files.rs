@@ -44,9 +44,7 @@ const ANSWERING: &str = "answering";
 const LOCK: &str = "lock";
 /// Longest wait for a repair that removes the lock file. It takes milliseconds.
 const REPAIR_PATIENCE: Duration = Duration::from_secs(1);
-/// Longest path of iceoryx2.
-const LONGEST_PATH: usize = 255;
-/// Most that it adds to a run's folder and prefix: `/nodes/`, 30 digits, `/`, a hash of 40 digits, `.service_tag`.
+/// Most that iceoryx2 adds to a run's folder and prefix: `/nodes/`, 30 digits, `/`, a hash of 40 digits, `.service_tag`.
 const LONGEST_ENDING: usize = 90;
 /// Length of a run's random name in letters and digits: 71 bits, which cannot be guessed.
 const NAME_LENGTH: usize = 12;
@@ -90,7 +88,8 @@ impl RunFiles {
             folder: self.folder.clone(),
             source: FolderError::UnusablePath,
         };
-        if self.folder.as_os_str().len() + self.prefix.len() + LONGEST_ENDING > LONGEST_PATH {
+        let longest = self.folder.as_os_str().len() + self.prefix.len() + LONGEST_ENDING;
+        if longest > IceoryxPath::max_len() {
             return Err(refuse());
         }
         let mut config = Config::default();
