@@ -17,25 +17,20 @@ use crate::refer::governor::{NEAR_M, Stretch, USABLE_REACH};
 
 /// Height above the belt at which the tip moves along it, m.
 const CLEARANCE_M: f32 = 0.5 * NEAR_M;
-/// Speed at which the tip is raised to its clearance, m/s. A fifth and a thousand times of it capture as many (lab book,
-/// *Constants, once more*).
-const RAISING_M_S: f32 = 0.1;
-/// Rate at which the height above the belt decays on the way down, as a part of the bandwidth of the motion. With four times of it
-/// fewer captures on compliant belts succeeded (the same).
-const DESCENT: f32 = 0.25;
+/// Rate of the path's slow changes, as a part of the bandwidth of the motion: at which its height above the belt decays, the landing
+/// point moves inwards while the path is out of reach, and the path moves on while friction of the joints holds the tip short of its
+/// landing point. With four times of it fewer captures on compliant belts succeeded (lab book, *Constants, once more*).
+const PATH_RATE: f32 = 0.25;
 /// Farthest path beyond where the tip should land, m: below the belt until contact is detected, and along it where friction of
 /// the joints holds the tip. Of a depth from 3 mm on, no campaign shows a difference (lab book, *Constants, once more*), but an
 /// arm whose links are 5 % shorter than assumed needs more than 20 mm.
 const FARTHEST_M: f32 = 0.03;
-/// Factor on the landing speed below the assumed belt: a tip that gets there shows that the links are
-/// shorter. Slower, and raised without limit, fewer captures succeeded (lab book, *Constants that are not needed*).
+/// Factor on the landing speed below the assumed belt: a tip that gets there shows that the links are shorter. As fast there as at the
+/// same height above it, more runs were lost (lab book, *Captures of an arm that is not known*).
 const SEARCHING: f32 = 4.0;
 /// Speed at which the landing point moves along the belt to the admissible stretch, m/s. At once, a tip was thrown along the
 /// belt (lab book, *The way to the landing point*).
 const TRAVEL_M_S: f32 = 0.5;
-/// Rate at which the landing point moves inwards while the path is out of reach, and at which the path moves on while friction
-/// of the joints holds the tip short of its landing point, 1/s.
-const YIELDING_PER_S: f32 = 2.0;
 
 settings! {
     /// Settings of the recovery.
@@ -104,6 +99,7 @@ impl RecoverySettings {
             touched_s: 0.0,
         });
         flight.touched_s = 0.0;
+        let part = (PATH_RATE * self.bandwidth_rad_s * tick_s).at_most(1.0);
         // Where the belt is higher than assumed, the tip rests on it on its way: it may land there, too.
         let waits = !flight.lands && flight.height_m == CLEARANCE_M;
         let rests = waits && model.tip_velocity_m_s.x.abs() < BOUND_ERROR_M_S;
@@ -119,20 +115,20 @@ impl RecoverySettings {
             away.abs() < NEAR_M || (flight.lands && tip_m > lower_m && tip_m < upper_m)
         });
         if rests {
-            let onwards_m = YIELDING_PER_S * tick_s * away;
-            flight.beyond_m = (flight.beyond_m + onwards_m).within(FARTHEST_M);
+            flight.beyond_m = (flight.beyond_m + part * away).within(FARTHEST_M);
         }
         // Descend faster at greater height, and at landing speed close to the belt.
-        let down_m_s = if flight.height_m < 0.0 {
-            SEARCHING * self.landing_speed_m_s
+        let landing_m = self.landing_speed_m_s * tick_s;
+        let down_m = if flight.height_m < 0.0 {
+            SEARCHING * landing_m
         } else {
-            self.landing_speed_m_s + DESCENT * self.bandwidth_rad_s * flight.height_m
+            landing_m + part * flight.height_m
         };
-        let lowest_m = flight.height_m - down_m_s * tick_s;
+        let lowest_m = flight.height_m - down_m;
         flight.height_m = if flight.lands {
             lowest_m.at_least(-FARTHEST_M)
         } else {
-            CLEARANCE_M.limited(lowest_m, flight.height_m + RAISING_M_S * tick_s)
+            CLEARANCE_M.at_least(lowest_m)
         };
         let wanted_m = Vector2::new(
             flight.landing_m + flight.beyond_m,
@@ -143,7 +139,7 @@ impl RecoverySettings {
         let distance_m = wanted_m.norm_squared().square_root();
         let excess = (distance_m / (USABLE_REACH * arm.reach_m())).at_least(1.0);
         if excess > 1.0 {
-            flight.landing_m *= 1.0 - tick_s * YIELDING_PER_S;
+            flight.landing_m *= 1.0 - part;
         }
         let path_rad = arm
             .link_angles_rad(&(wanted_m / excess), flight.posture)

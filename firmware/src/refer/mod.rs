@@ -92,7 +92,6 @@ impl References {
         } else if let (false, Some(posture)) = (contact.touches, landing) {
             self.posture = posture;
         }
-        let starts = phase.arms || contact.lands;
         if phase.arms || (contact.lands && phase.state == SupervisorState::Armed) {
             self.generator.restart(tip_t_m);
         }
@@ -112,7 +111,9 @@ impl References {
             _ if phase.starts_tracking || self.waits => self.generator.start(),
             SupervisorState::Tracking | SupervisorState::LiftOff => self.generator.next_tick(),
         };
-        if starts || phase.starts_tracking {
+        // The belt may drag a tip that has landed. Led back to where it touched, it could pass an edge that is not known yet.
+        let settles = contact.touches && self.asks_for_landing;
+        if phase.arms || contact.lands || phase.starts_tracking || settles {
             self.governor.restart(tip_t_m);
         }
         Target {

@@ -38,6 +38,31 @@ fn an_arm_that_lands_in_another_posture_keeps_its_edges() {
     assert_eq!((end.statistics.lift_offs, end.fault), (0, None));
 }
 
+/// Friction and lengths are not those that the controller assumes, so that the edges that it knows while the tip lands are
+/// wrong, and the belt drags the tip. Led back to where it has landed, it would pass an edge.
+#[test]
+fn a_captured_tip_is_led_nowhere_until_its_edges_are_known() {
+    for (friction, speed_m_s, length_m) in [
+        (0.59, -0.36, 0.215),
+        (0.66, -0.32, 0.2077),
+        (0.74, -0.3, 0.213),
+        (0.77, -0.42, 0.202),
+    ] {
+        let end = run(
+            "capture",
+            &[
+                &format!("belt.friction={friction}"),
+                &format!("belt.profile.speed_m_s={speed_m_s}"),
+                &format!("arm_model.link_length_m=[{length_m}, {length_m}]"),
+                "run.duration_s=4",
+            ],
+        );
+        // Once: the arm bounces when the drive is switched on.
+        let after = (end.statistics.lift_offs, end.fault);
+        assert_eq!(after, (1, None), "{friction} {length_m}");
+    }
+}
+
 /// The margin is larger than any place in reach can keep.
 #[test]
 fn a_thrown_tip_lands_no_nearer_the_edge_for_a_larger_margin() {
