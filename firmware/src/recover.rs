@@ -25,8 +25,9 @@ const PATH_RATE: f32 = 0.25;
 /// the joints holds the tip. Of a depth from 3 mm on, no campaign shows a difference (lab book, *Constants, once more*), but an
 /// arm whose links are 5 % shorter than assumed needs more than 20 mm.
 const FARTHEST_M: f32 = 0.03;
-/// Factor on the landing speed below the assumed belt: a tip that gets there shows that the links are shorter. As fast there as at the
-/// same height above it, more runs were lost (lab book, *Captures of an arm that is not known*).
+/// Factor on the landing speed below the assumed belt: a tip that gets there shows that the links are shorter. Slower, fewer captures
+/// succeeded (lab book, *Constants that are not needed*); as fast there as at the same height above it, and with a path raised at
+/// once, more runs were lost (lab book, *Captures of an arm that is not known*).
 const SEARCHING: f32 = 4.0;
 /// Speed at which the landing point moves along the belt to the admissible stretch, m/s. At once, a tip was thrown along the
 /// belt (lab book, *The way to the landing point*).
