@@ -19,7 +19,7 @@ use crate::refer::governor::{NEAR_M, Stretch, USABLE_REACH};
 const CLEARANCE_M: f32 = 0.5 * NEAR_M;
 /// Rate of the path's slow changes, as a part of the bandwidth of the motion: at which its height above the belt decays, the landing
 /// point moves inwards while the path is out of reach, and the path moves on while friction of the joints holds the tip short of its
-/// landing point. With four times of it fewer captures on compliant belts succeeded (lab book, *Constants, once more*).
+/// landing point. Lowered at four times of it, fewer captures on compliant belts succeeded (lab book, *Constants, once more*).
 const PATH_RATE: f32 = 0.25;
 /// Farthest path beyond where the tip should land, m: below the belt until contact is detected, and along it where friction of
 /// the joints holds the tip. Of a depth from 3 mm on, no campaign shows a difference (lab book, *Constants, once more*), but an
@@ -119,11 +119,11 @@ impl RecoverySettings {
             flight.beyond_m = (flight.beyond_m + part * away).within(FARTHEST_M);
         }
         // Descend faster at greater height, and at landing speed close to the belt.
-        let landing_m = self.landing_speed_m_s * tick_s;
+        let least_m = self.landing_speed_m_s * tick_s;
         let down_m = if flight.height_m < 0.0 {
-            SEARCHING * landing_m
+            SEARCHING * least_m
         } else {
-            landing_m + part * flight.height_m
+            least_m + part * flight.height_m
         };
         let lowest_m = flight.height_m - down_m;
         flight.height_m = if flight.lands {

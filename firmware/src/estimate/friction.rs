@@ -29,7 +29,8 @@ const NO_NOISE_SQUARE: f32 = 16.0;
 const DIFFERENT_SQUARE: f32 = 4.0 * NO_NOISE_SQUARE;
 
 /// Fraction of the estimated friction that indicates a slip in the opposite direction. From 0 to 0.96, it changes no run (lab
-/// book, *Factors on constants*), but of a tip that sticks, less friction on the other side shows no slip.
+/// book, *Factors on constants*, *Captures of an arm that is not known*), but of a tip that sticks, less friction on the other side
+/// shows no slip.
 const REVERSAL_FRACTION: f32 = 0.8;
 
 /// Number of such ticks in a row that reverse the slip. Friction of a tip that bounces alternates: with one tick, four
@@ -37,14 +38,15 @@ const REVERSAL_FRACTION: f32 = 0.8;
 const REVERSAL_TICKS: u8 = 3;
 
 /// Least variance of the noise of a ratio that is considered, as a part of the one that the force cell's noise gives. Ten times of
-/// it lost more runs, next to none of it no more (the same), but readings that happen to be equal would then make the next one a
-/// sudden change of μ.
+/// it lost more runs, next to none of it no more (the same sections), but readings that happen to be equal would then make the next
+/// one a sudden change of μ.
 const LEAST_NOISE: f32 = 0.01;
 
 /// Averaging time of the innovations, s. With 0.05 s more runs were lost (lab book, *Constants merged*).
 const MEAN_S: f32 = 0.02;
 /// Ticks for which the torque misses a sudden change of μ: on average half a tick until a reading shows it,
-/// and one until the torque that it causes acts. Without them, eleven more of 200 runs over patches of μ were lost (the same).
+/// and one until the torque that it causes acts. Without them, eleven more of 200 runs over patches of μ were
+/// lost (lab book, *Captures of an arm that is not known*).
 const MISSED_TICKS: f32 = 1.5;
 
 settings! {

@@ -39,9 +39,9 @@ fn an_arm_that_lands_in_another_posture_keeps_its_edges() {
 }
 
 /// Friction and lengths are not those that the controller assumes, so that the edges that it knows while the tip lands are
-/// wrong, and the belt drags the tip. Led back to where it has landed, it would pass an edge.
+/// wrong, and the belt drags the tip. Led back to where it first touched, it would pass an edge.
 #[test]
-fn a_captured_tip_is_led_nowhere_until_its_edges_are_known() {
+fn a_captured_tip_is_not_led_back_to_where_it_touched() {
     for (friction, speed_m_s, length_m) in [
         (0.59, -0.36, 0.215),
         (0.66, -0.32, 0.2077),
