@@ -285,7 +285,7 @@ impl Board for F405 {
     }
 
     fn idle() {
-        cortex_m::asm::wfi();
+        clock::sleep();
     }
 }
 

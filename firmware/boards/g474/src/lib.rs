@@ -227,7 +227,7 @@ impl Board for G474 {
     }
 
     fn idle() {
-        cortex_m::asm::wfi();
+        clock::sleep();
     }
 }
 

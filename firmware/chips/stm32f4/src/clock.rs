@@ -1,6 +1,6 @@
-//! Reasons for a reset, and monitoring of the crystal (RM0090, chapter RCC).
+//! Reasons for a reset, monitoring of the crystal (RM0090, chapter RCC), and sleep.
 
-#![allow(unsafe_code)] // a register that the start does not own
+#![allow(unsafe_code)] // registers that the start does not own
 
 use painleve_shared::black_box::ResetCause;
 use stm32f4xx_hal::pac;
@@ -28,4 +28,13 @@ pub fn reset_cause() -> ResetCause {
 /// Starts monitoring the crystal: if it stops, the non-maskable interrupt is raised at once.
 pub fn watch_crystal(rcc: &pac::rcc::RegisterBlock) {
     rcc.cr().modify(|_, w| w.csson().set_bit());
+}
+
+/// Sleeps until an interrupt, in which the processor's own clock runs on (DBGMCU_CR, DBG_SLEEP): without it the cycle counter
+/// would stand still. A debugger that leaves may have stopped it, so that every sleep starts it.
+pub fn sleep() {
+    // SAFETY: a bit that no other code changes.
+    let control = unsafe { (*pac::DBGMCU::ptr()).cr() };
+    control.modify(|_, w| w.dbg_sleep().set_bit());
+    cortex_m::asm::wfi();
 }

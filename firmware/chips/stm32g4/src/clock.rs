@@ -98,3 +98,12 @@ pub fn reset_cause() -> ResetCause {
     status.modify(|_, w| w.rmvf().set_bit());
     cause
 }
+
+/// Sleeps until an interrupt, in which the processor's own clock runs on (DBGMCU_CR, DBG_SLEEP): without it the cycle counter
+/// would stand still. A debugger that leaves may have stopped it, so that every sleep starts it.
+pub fn sleep() {
+    // SAFETY: a bit that no other code changes.
+    let control = unsafe { (*pac::DBGMCU::ptr()).cr() };
+    control.modify(|_, w| w.dbg_sleep().set_bit());
+    cortex_m::asm::wfi();
+}

@@ -42,7 +42,7 @@ impl<C: Chip> Machine<C> {
                 (Ok(()), Some(Stop::Look)) => {
                     if core.system.reset_requested {
                         self.reset(Reset::Software);
-                    } else if !core.chip.wants_reset() && !self.pass_time_to_next_event() {
+                    } else if !core.chip.wants_reset() && !self.pass_time_to_next_event(true) {
                         return;
                     }
                 }
@@ -78,7 +78,8 @@ impl<C: Chip> Machine<C> {
                 self.unicorn.set(Register::PC, next);
                 return true;
             }
-            if !self.pass_time_to_next_event() {
+            let is_clocked = core.chip.is_clocked_in_sleep();
+            if !self.pass_time_to_next_event(is_clocked) {
                 return false;
             }
             if let Some(reset) = self.chip_mut().take_reset() {
@@ -89,11 +90,11 @@ impl<C: Chip> Machine<C> {
     }
 
     /// Lets time pass without executing instructions; returns whether the limit has not been
-    /// reached.
-    fn pass_time_to_next_event(&mut self) -> bool {
+    /// reached. The cycles count if the processor is clocked.
+    fn pass_time_to_next_event(&mut self, is_clocked: bool) -> bool {
         let (core, processor) = self.unicorn.split();
         let until = core.next_event.min(core.limit).max(core.now);
-        let hz = core.chip.core_hz();
+        let hz = if is_clocked { core.chip.core_hz() } else { 0 };
         let passed = until - core.now;
         core.cycles += (u128::from(passed) * u128::from(hz) / u128::from(crate::SECOND)) as u64;
         core.now = until;

@@ -72,6 +72,10 @@ pub trait Chip: Clone {
     /// Returns the processor's clock, Hz; 0 if it has stopped.
     fn core_hz(&self) -> u64;
 
+    /// Returns whether the processor's own clock runs on while it sleeps (DBGMCU_CR: DBG_SLEEP). Without it, the cycle
+    /// counter stands still.
+    fn is_clocked_in_sleep(&self) -> bool;
+
     /// Returns whether the flash is busy, so that no instruction and no vector can be read from it.
     fn flash_is_stalled(&self, now: Picoseconds) -> bool {
         let _ = now;

@@ -138,6 +138,8 @@ pub struct Stm32f4<O> {
     keys: [usize; 2],
     syscfg: [u32; 16],
     external_interrupts: [u32; 8],
+    /// The register of debug control that says which clocks run on in sleep.
+    debug: u32,
     reset: Option<Reset>,
 }
 
@@ -172,6 +174,7 @@ impl<O: Outside> Stm32f4<O> {
             keys: [0; 2],
             syscfg: [0; 16],
             external_interrupts: [0; 8],
+            debug: 0,
             reset: None,
         }
     }
@@ -236,6 +239,7 @@ impl<O: Outside> Stm32f4<O> {
                 _ => 0,
             },
             0xe004_2000 if offset == 0 => self.individual.identification,
+            0xe004_2000 if offset == 4 => self.debug,
             _ => panic!("load from {address:#010x}, which is not modelled"),
         }
     }
@@ -306,7 +310,8 @@ impl<O: Outside> Stm32f4<O> {
             0x4002_6400 if self.rcc.is_on(0x30, 22) => self.dma[1].write(offset, value),
             0x4000_0000 | 0x4000_2c00 | 0x4000_3800 | 0x4000_7000 | 0x4000_7400 | 0x4001_1000
             | 0x4001_2000 | 0x4001_3000 | 0x4002_6000 | 0x4002_6400 => {}
-            // Debug control.
+            0xe004_2000 if offset == 4 => self.debug = value,
+            // The rest of debug control.
             0xe004_2000 => {}
             _ => panic!("store of {value:#x} to {address:#010x}, which is not modelled"),
         }
@@ -451,6 +456,9 @@ impl<O: Outside> Chip for Stm32f4<O> {
         self.load_options();
         self.syscfg = [0; 16];
         self.external_interrupts = [0; 8];
+        if matches!(reset, Reset::Power | Reset::BrownOut) {
+            self.debug = 0;
+        }
         self.reset = None;
     }
 
@@ -572,6 +580,10 @@ impl<O: Outside> Chip for Stm32f4<O> {
 
     fn core_hz(&self) -> u64 {
         self.rcc.core_hz()
+    }
+
+    fn is_clocked_in_sleep(&self) -> bool {
+        self.debug & 1 != 0
     }
 }
 

@@ -85,6 +85,8 @@ pub struct Stm32g4<O> {
     supply_mv: u32,
     flash: Flash,
     external_interrupts: [u32; 16],
+    /// The register of debug control that says which clocks run on in sleep.
+    debug: u32,
     reset: Option<Reset>,
 }
 
@@ -155,6 +157,7 @@ impl<O: Outside> Stm32g4<O> {
                 _ => 0,
             },
             0xe004_2000 if offset == 0 => self.individual.identification,
+            0xe004_2000 if offset == 4 => self.debug,
             0xe004_2000 => 0,
             _ => self.ports[(address >> 10 & 7) as usize].read(offset),
         }
@@ -207,7 +210,8 @@ impl<O: Outside> Stm32g4<O> {
                 self.dac.write(offset, value);
                 self.check_converter(hz);
             }
-            // Debug control.
+            0xe004_2000 if offset == 4 => self.debug = value,
+            // The rest of debug control.
             0xe004_2000 => {}
             0x1fff_7400 => panic!("store to {address:#010x}, which cannot change"),
             _ => {
@@ -292,6 +296,7 @@ impl<O: Outside> Chip for Stm32g4<O> {
         self.flash.reset(now);
         if matches!(reset, Reset::Power | Reset::BrownOut) {
             self.flash.load_options();
+            self.debug = 0;
         }
         self.external_interrupts = [0; 16];
         // The lines that only peripherals raise are not masked.
@@ -402,6 +407,10 @@ impl<O: Outside> Chip for Stm32g4<O> {
     fn core_hz(&self) -> u64 {
         self.rcc.core_hz()
     }
+
+    fn is_clocked_in_sleep(&self) -> bool {
+        self.debug & 1 != 0
+    }
 }
 
 impl<O: Outside> WiredChip for Stm32g4<O> {
@@ -431,6 +440,7 @@ impl<O: Outside> WiredChip for Stm32g4<O> {
             supply_mv: 3300,
             flash: Flash::new(),
             external_interrupts: [0; 16],
+            debug: 0,
             reset: None,
         }
     }
