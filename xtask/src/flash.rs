@@ -31,9 +31,16 @@ pub fn run(arguments: &FlashArguments) -> Result<(), ChoreError> {
     let image = build_fw::image(&arguments.image);
     run_with(
         "probe-rs",
-        &["run", "--chip", chip, &image.to_string_lossy()],
+        &probe_arguments(chip, &image.to_string_lossy()),
         &[],
     )
+}
+
+/// Returns the arguments of probe-rs, which from 0.28 on else stops the processor at every hard fault, before the handler that
+/// takes the torque off, and at every reset, such as those of `painleve accept`.
+fn probe_arguments<'a>(chip: &'a str, image: &'a str) -> [&'a str; 6] {
+    let [fault, reset] = ["--no-catch-hardfault", "--no-catch-reset"];
+    ["run", "--chip", chip, fault, reset, image]
 }
 
 /// Returns the chip for an image.
@@ -51,4 +58,18 @@ fn chip<'a>(boards: &'a [BoardPackage], image: &str) -> Result<&'a str, ChoreErr
             names.join(" or ")
         ))
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn hard_faults_and_resets_are_left_to_the_image() {
+        let arguments = probe_arguments("STM32F405RGTx", "image");
+        assert!(arguments.contains(&"--no-catch-hardfault"));
+        assert!(arguments.contains(&"--no-catch-reset"));
+        assert_eq!(arguments[..3], ["run", "--chip", "STM32F405RGTx"]);
+        assert_eq!(arguments.last(), Some(&"image"));
+    }
 }
