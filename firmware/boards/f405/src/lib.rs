@@ -200,12 +200,13 @@ impl Board for F405 {
             phase: Phase::CaptureOnSecondTransition,
         };
         // At reset, two of these pins belong to the debugger, which uses them only for JTAG. With a slow clock pin the
-        // last bit of a word may be received wrongly (ES0182, delayed SCK feedback).
+        // last bit of a word may be received wrongly (ES0182, delayed SCK feedback). The encoders' bits come faster than an
+        // output changes at low speed (2 MHz).
         let fastest = Speed::VeryHigh;
         let pins = (
             Some(b.pb3.into_alternate::<5>().speed(fastest)),
             Some(b.pb4.into_alternate::<5>()),
-            Some(b.pb5.into_alternate::<5>()),
+            Some(b.pb5.into_alternate::<5>().speed(fastest)),
         );
         let core_hz = rcc.clocks.sysclk().raw();
         let spi = Spi::new(device.SPI1, pins, mode_1, ENCODER_BUS_HZ.Hz(), &mut rcc);

@@ -157,12 +157,18 @@ pub fn is_within(hz: u64, limit_hz: u64) -> bool {
     hz - hz / CRYSTAL <= limit_hz
 }
 
-/// Checks the pins of an SPI bus (0 for SPI1) before a transfer: clock, input and output, all on port B.
-pub fn check_spi_pins(port_b: &Gpio, bus: usize) {
+/// Checks the pins of an SPI bus (0 for SPI1) before a transfer of `bits_hz`: clock, input and output, all on port B.
+pub fn check_spi_pins(port_b: &Gpio, bus: usize, bits_hz: u64) {
     const PINS: [[usize; 3]; 2] = [[3, 4, 5], [13, 14, 15]];
     const HIGH_SPEED: u32 = 2;
+    /// Fastest output at low speed, Hz (RM0090, GPIOx_OSPEEDR); bits that alternate are a clock of half their rate.
+    const LOW_SPEED_HZ: u64 = 2_000_000;
     check_function(port_b, PINS[bus], 5);
-    let [clock, ..] = PINS[bus];
+    let [clock, _, output] = PINS[bus];
+    assert!(
+        bits_hz / 2 <= LOW_SPEED_HZ || port_b.speed(output) > 0,
+        "PB{output} is slow"
+    );
     // The last bit is sampled by the clock that comes back from this pin (ES0182, delayed SCK feedback).
     assert!(port_b.speed(clock) >= HIGH_SPEED, "PB{clock} is slow");
 }

@@ -502,7 +502,7 @@ impl<O: Outside> Chip for Stm32f4<O> {
         self.timer.advance(self.rcc.slow_timer_hz(), now);
         for (bus, hz) in [fast, slow].into_iter().enumerate() {
             while let Some(transfer) = self.spis[bus].ended(now) {
-                check_spi_pins(&self.ports[1], bus);
+                check_spi_pins(&self.ports[1], bus, transfer.hz);
                 let received = self.outside.transfer(bus, transfer, now);
                 self.spis[bus].complete(received, hz);
             }

@@ -340,7 +340,7 @@ impl<O: Outside> Chip for Stm32g4<O> {
         self.timer.advance(hz, now);
         for bus in 0..2 {
             while let Some(transfer) = self.spis[bus].ended(now) {
-                check_spi_pins(&self.ports[1], bus);
+                check_spi_pins(&self.ports[1], bus, transfer.hz);
                 let received = self.outside.transfer(bus, transfer, now);
                 self.spis[bus].complete(received, hz);
             }
