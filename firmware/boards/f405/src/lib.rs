@@ -57,9 +57,9 @@ use crate::emulator::Link;
 /// Crystal, MHz.
 const CRYSTAL_MHZ: u32 = 8;
 
-/// Number of polls for a crystal that does not start: some 10 ms at the internal 16 MHz; a crystal needs
-/// about 2 ms.
-const CRYSTAL_PATIENCE: u32 = 20_000;
+/// Number of polls for a crystal that does not start: some 100 ms at the internal 16 MHz; a crystal needs 2 ms, but the data
+/// sheet names no longest time.
+const CRYSTAL_PATIENCE: u32 = 240_000;
 
 /// Watchdog timeout while starting; it also bounds the wait for the phase-locked loop.
 const START_LIMIT_S: f32 = 0.5;

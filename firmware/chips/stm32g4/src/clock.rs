@@ -9,9 +9,9 @@ use crate::{PATIENCE, comes, pac};
 /// The clock of processor, buses and timers, Hz.
 pub const CORE_HZ: u32 = 170_000_000;
 
-/// Number of polls for a crystal that does not start: some 10 ms at the internal 16 MHz; a crystal needs about
-/// 2 ms.
-const CRYSTAL_PATIENCE: u32 = 20_000;
+/// Number of polls for a crystal that does not start: some 100 ms at the internal 16 MHz; a crystal needs 2 ms, but the data
+/// sheet names no longest time.
+const CRYSTAL_PATIENCE: u32 = 240_000;
 
 /// Cycles of at least 1 µs at 85 MHz.
 const BOOST_CYCLES: u32 = 100;

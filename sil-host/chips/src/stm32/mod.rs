@@ -69,13 +69,15 @@ pub trait Outside: Clone {
     fn transfer(&mut self, bus: usize, transfer: Transfer, now: Picoseconds) -> u16;
 }
 
-/// A failure of the crystal.
+/// What is wrong with the crystal.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Crystal {
     /// It never oscillates.
     Dead,
     /// It has oscillated and stops.
     Stops,
+    /// It oscillates this long after it was switched on.
+    Slow(Picoseconds),
 }
 
 /// A chip with parts on its pins, as a board and its host see it.
@@ -113,7 +115,7 @@ pub trait WiredChip: Chip {
     /// Gives the chip the option bytes of a new one, without a brown-out level.
     fn set_new_options(&mut self);
 
-    /// Stops the crystal.
+    /// Gives the chip such a crystal.
     fn set_crystal(&mut self, failure: Crystal);
 
     /// Changes the supply. The chip is reset below the brown-out threshold.

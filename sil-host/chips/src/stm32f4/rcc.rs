@@ -16,7 +16,7 @@ const INTERNAL_HZ: u64 = 16_000_000;
 /// Frequency of the crystal, Hz.
 const CRYSTAL_HZ: u64 = 8_000_000;
 
-/// Start-up time of the crystal.
+/// Usual start-up time of the crystal.
 const CRYSTAL_START: Picoseconds = 2 * MILLISECOND;
 
 /// Longest time until the phase-locked loop has settled.
@@ -36,6 +36,8 @@ pub struct Rcc {
     pll_ready_at: Picoseconds,
     /// Frequency of the crystal, Hz.
     crystal_hz: u64,
+    /// Start-up time of the crystal.
+    pub crystal_start: Picoseconds,
     /// Whether the crystal oscillates when switched on.
     pub crystal_works: bool,
     /// Set when the clock security system has detected a stopped crystal.
@@ -69,6 +71,7 @@ impl Rcc {
             hse_ready_at: Picoseconds::MAX,
             pll_ready_at: Picoseconds::MAX,
             crystal_hz: CRYSTAL_HZ,
+            crystal_start: CRYSTAL_START,
             crystal_works: true,
             nmi: false,
         }
@@ -85,6 +88,7 @@ impl Rcc {
             Reset::Pin => 0x0400_0000,
         };
         *self = Self {
+            crystal_start: self.crystal_start,
             crystal_works: self.crystal_works,
             crystal_hz: self.crystal_hz,
             flags: self.flags | reason,
@@ -139,7 +143,7 @@ impl Rcc {
         match offset {
             0x00 => {
                 if value & !self.control & HSE_ON != 0 {
-                    self.hse_ready_at = now + CRYSTAL_START;
+                    self.hse_ready_at = now + self.crystal_start;
                 }
                 if value & !self.control & PLL_ON != 0 {
                     let has_source = self.pll_has_source(now);

@@ -500,6 +500,7 @@ impl<O: Outside> WiredChip for Stm32g4<O> {
         match failure {
             Crystal::Dead => self.rcc.crystal_works = false,
             Crystal::Stops => self.rcc.stop_crystal(),
+            Crystal::Slow(start) => self.rcc.crystal_start = start,
         }
     }
 

@@ -14,6 +14,7 @@ use super::{DEFAULT, assert_off_in_time, driven};
 
 crate::on_each_board! {
     the_first_instructions_switch_the_stages_off,
+    a_slow_crystal_is_waited_for,
     a_dead_crystal_leaves_the_stages_off,
     a_hard_fault_takes_the_torque_off,
     a_stack_that_overflows_takes_the_torque_off_and_is_recorded,
@@ -44,6 +45,21 @@ fn the_first_instructions_switch_the_stages_off<C: BoardChip>() {
         floating += u32::from(enabled.is_none());
     }
     assert!(floating < 300, "{floating} instructions");
+}
+
+/// The data sheets give 2 ms as typical, and no longest time.
+fn a_slow_crystal_is_waited_for<C: BoardChip>() {
+    let mut board = EmulatedBoard::<C>::default();
+    let slow = Crystal::Slow(90 * MILLISECOND);
+    board.machine.chip_mut().set_crystal(slow);
+    board.machine.run_for(110 * MILLISECOND);
+    board.send(&Request::Identify);
+    let answer = board.reply(20 * MILLISECOND);
+    assert!(
+        matches!(answer, Some(Response::Identity { .. })),
+        "{answer:?}"
+    );
+    assert_eq!(board.resets(), []);
 }
 
 fn a_dead_crystal_leaves_the_stages_off<C: BoardChip>() {
