@@ -33,20 +33,19 @@ PANELS = (
 
 
 def outcome(columns: Run) -> dict[str, float]:
-    """Returns what became of a run: lift-offs that last until a tick, fault (0 for none), tip and tracking error at the end,
-    RMS error, largest torque."""
-    errors = [
-        tip - reference
-        for tip, reference in zip(columns["plant.tip_t_m"], columns["plant.reference_tip_t_m"])
-        if math.isfinite(tip - reference)
-    ]
+    """Returns what became of a run: lift-offs that last until a tick, fault (0 for none), tip and tracking error at the end
+    (NaN after a fault), RMS error, largest torque."""
+    pairs = zip(columns["plant.tip_t_m"], columns["plant.reference_tip_t_m"])
+    # NaN without a reference, as after a fault: an earlier error is not that at the end.
+    all_errors = [tip - reference for tip, reference in pairs]
+    errors = [error for error in all_errors if math.isfinite(error)]
     modes = columns["plant.mode"]
     torques = itertools.chain(columns["plant.u1_nm"], columns["plant.u2_nm"])
     return {
         "lift_offs": sum(now == "flight" != before for before, now in itertools.pairwise(modes)),
         "fault": columns["actuator.fault_number"][-1],
         "final_tip_m": columns["plant.tip_t_m"][-1],
-        "final_error_m": errors[-1] if errors else math.nan,
+        "final_error_m": all_errors[-1],
         "rms_error_m": math.sqrt(sum(error * error for error in errors) / len(errors)) if errors else math.nan,
         "peak_torque_nm": max(map(abs, torques)),
     }

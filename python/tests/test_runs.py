@@ -25,6 +25,12 @@ def test_a_sweep_has_a_line_for_each_combination():
         painleve.sweep("edge", {"belt.friction": [-1]})
 
 
+def test_a_run_that_ends_with_a_fault_has_no_error_at_the_end():
+    lines = painleve.sweep("pid-elbow-up", {"run.seed": [1]})
+    assert lines["fault"][0] == 7 and lines["rms_error_m"][0] > 0.05
+    assert math.isnan(lines["final_error_m"][0])
+
+
 def test_runs_are_compared_from_an_event_on():
     first = painleve.run("edge", SHORT)
     same = painleve.compare(first, first)
