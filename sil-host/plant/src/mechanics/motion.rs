@@ -94,7 +94,8 @@ pub struct Evaluation {
     pub slip: [f64; 2],
     /// Free normal acceleration b, m/s².
     pub b_m_s2: f64,
-    /// p = Q22 − μ s Q21, 1/kg, for the mode's direction of slip, or for that of the motion.
+    /// p = Q22 − μ s Q21, 1/kg, for the mode's direction of slip; in flight, for that of the motion; of a sticking tip, for
+    /// the slip that friction prevents.
     pub p_per_kg: f64,
     /// Q22, 1/kg.
     pub q22_per_kg: f64,
@@ -260,7 +261,7 @@ impl Motion<'_> {
         let friction = self.friction * direction.sign::<f64>();
         let response = mobility * (normal - along * friction);
         let b_m_s2 = normal.dot(&free) + centripetal.y;
-        let p_per_kg = normal.dot(&response);
+        let mut p_per_kg = normal.dot(&response);
         let (force_n, acceleration) = match mode {
             ContactMode::Flight => (Vector2::zeros(), free),
             ContactMode::SlidePositive | ContactMode::SlideNegative => {
@@ -276,6 +277,8 @@ impl Motion<'_> {
                     free_acceleration_m_s2: jacobian * free + centripetal,
                 };
                 let force = self.force_n(t_s, mode, &contact);
+                // Its own slip is rounding.
+                p_per_kg = contact.p_per_kg(self.friction, Slip::of(-force.x));
                 (force, free + mobility * (jacobian.transpose() * force))
             }
         };

@@ -1,8 +1,8 @@
 //! Tests of the whole plant against closed forms and conservation laws.
 
-use painleve_shared::{Arm, ArmParameters, JointTorque, LinkMotion, Pose, Posture};
+use painleve_shared::{Arm, ArmParameters, JointTorque, LinkMotion, Pose, Posture, Slip};
 
-use crate::plant::{ContactMode, Event, State};
+use crate::plant::{ContactMode, Event, Plant, State};
 use crate::statistics::Statistics;
 
 use super::belt::BeltProfile;
@@ -164,6 +164,13 @@ fn a_sticking_tip_moves_with_an_accelerating_belt() {
     for step in 1..=2000 {
         plant.advance(f64::from(step) * 1e-3, &mut drift).unwrap();
         if plant.mode() == ContactMode::Stick {
+            let at = plant.snapshot();
+            let slip = Slip::of(-at.tangential_force_n);
+            let p = plant
+                .motion()
+                .arm
+                .p_per_kg(&Pose::new(&at.theta_rad), 1.0, slip);
+            assert!((at.p_per_kg - p).abs() < 1e-9, "{at:?}");
             let tip = plant.motion().tip_t_m(plant.state());
             let (since, anchor) = *start.get_or_insert((plant.time_s(), tip));
             let moved = parameters.belt.displacement_m(since, plant.time_s());

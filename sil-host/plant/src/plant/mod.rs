@@ -125,7 +125,7 @@ pub struct Snapshot {
     pub tangential_force_n: f64,
     /// Free normal acceleration b, m/s².
     pub b_m_s2: f64,
-    /// p for the present direction of slip, 1/kg.
+    /// p for the present direction of slip, 1/kg; of a sticking tip, for the slip that friction prevents.
     pub p_per_kg: f64,
     /// Torques u1, u2 that act on the joints, N·m.
     pub torque_nm: JointTorque<f64>,

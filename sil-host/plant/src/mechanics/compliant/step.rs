@@ -57,10 +57,13 @@ impl<'a> CompliantMotion<'a> {
         let state = State::new(x[0], x[1], x[2], x[3]);
         let pose = Pose::new(&LinkMotion::new(x[0], x[1]));
         let motion = self.rigid(t_s, self.arm.tip_m(&pose).x);
-        let slip_m_s = motion.relative_velocity_m_s(t_s, &state).x;
-        let slides = ContactMode::slide(Slip::of(slip_m_s));
-        let here = motion.evaluate(slides, t_s, &state);
         let touch = self.touch_at(t_s, x);
+        let slips = match mode {
+            ContactMode::Stick => -touch.force_n.x,
+            _ => motion.relative_velocity_m_s(t_s, &state).x,
+        };
+        let slides = ContactMode::slide(Slip::of(slips));
+        let here = motion.evaluate(slides, t_s, &state);
         let slope: SVector<f64, FULL> = self.derivative(t_s, x);
         Snapshot {
             theta_ddot_rad_s2: LinkMotion::new(slope[2], slope[3]),
