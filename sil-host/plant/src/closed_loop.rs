@@ -223,7 +223,7 @@ pub struct LoopResult {
     pub at_edge: bool,
     /// Ticks on which the controller limited its torque.
     pub saturated_ticks: u64,
-    /// Ticks without an answer in time.
+    /// Ticks whose answer does not arrive in time.
     pub stale_ticks: u64,
     /// Tick at which the torque stages removed the torque because commands were missing.
     pub drive_watchdog_tick: Option<u64>,
@@ -314,7 +314,8 @@ impl<H: ControllerHost, P: Plant> ClosedLoop<H, P> {
         }
         // A late answer that reports a fault takes effect, but does not answer this tick.
         let answered = frame.is_some_and(|answer| answer.tick == sensor.tick);
-        self.stale_ticks += u64::from(!answered);
+        let arrives = answered && !self.simulation.actuator_frame_is_lost();
+        self.stale_ticks += u64::from(!arrives);
         monitor.answer(self.simulation.plant().time_s(), &self.last_answer);
         if monitor.wants_samples() {
             monitor.sample(&Sample {
@@ -363,6 +364,7 @@ impl<H: ControllerHost, P: Plant> ClosedLoop<H, P> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::converters::link_loss::LossyLink;
     use crate::scenario::{Scenario, built_in};
 
     /// Answers every frame with the same state and fault.
@@ -420,5 +422,21 @@ mod tests {
             assert_eq!(result.final_reference_m, None);
             assert!(result.round_trips_ns.is_empty());
         }
+    }
+
+    #[test]
+    fn a_tick_whose_answer_is_lost_on_its_way_is_one_without_an_answer() {
+        let change = ["converters.link.frame_loss=0.2".to_owned()];
+        let scenario = Scenario::load(built_in::DEFAULT, &change).unwrap();
+        let mut link = LossyLink::new(&scenario.converters.link, scenario.run.seed);
+        let simulation = Simulation::new(&scenario).unwrap();
+        let mut closed_loop = ClosedLoop::new(simulation, Fixed::default());
+        let mut lost = 0;
+        for _ in 0..40 {
+            let frames = link.draw();
+            lost += u64::from(frames.sensor || frames.actuator);
+            closed_loop.tick(&mut ()).unwrap();
+        }
+        assert_eq!(closed_loop.finish().0.stale_ticks, lost);
     }
 }

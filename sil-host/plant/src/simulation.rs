@@ -218,6 +218,11 @@ impl<P: Plant> Simulation<P> {
         self.lost.sensor
     }
 
+    /// Returns whether the answer to this tick's sample is lost.
+    pub fn actuator_frame_is_lost(&self) -> bool {
+        self.lost.actuator
+    }
+
     /// Returns the complete data of this tick, for records. `answered` stays false: only the caller knows it.
     pub fn describe(&self, sensor: &SensorFrame, actuator: &ActuatorFrame) -> Sample {
         Sample {
