@@ -276,16 +276,20 @@ impl RunReport {
         if let Some(target_m) = self.requested_target_m.filter(is_short) {
             let short_mm = 1e3 * short_m(target_m);
             let known_mm = 1e3 * self.distance_for_knowledge_m;
-            let held = format!("; held {short_mm:.1} mm short");
-            let why = if !self.at_edge {
-                String::new()
-            } else if self.distance_for_knowledge_m >= TOLD_M {
+            let mut reasons = Vec::new();
+            if let Some(p_per_kg) = self.kept_p_per_kg {
+                reasons.push(format!(
+                    "controller.governor.p_per_kg keeps p at {p_per_kg} or more"
+                ));
+            }
+            if self.distance_for_knowledge_m >= TOLD_M {
                 let doubt = self.chief_doubt.as_deref().unwrap_or(UNKNOWN_PLACE);
-                format!("{held}: {known_mm:.1} mm of it because {doubt}")
-            } else if let Some(p_per_kg) = self.kept_p_per_kg {
-                format!("{held}: controller.governor.p_per_kg keeps p at {p_per_kg} or more")
-            } else {
-                held
+                reasons.push(format!("{known_mm:.1} mm of it because {doubt}"));
+            }
+            let why = match (self.at_edge, &reasons[..]) {
+                (false, _) => String::new(),
+                (true, []) => format!("; held {short_mm:.1} mm short"),
+                (true, _) => format!("; held {short_mm:.1} mm short: {}", reasons.join(", ")),
             };
             row("requested", format!("{:+.2} mm{why}", 1e3 * target_m));
         }

@@ -475,6 +475,22 @@ fn a_run_held_by_an_edge_reports_how_near_it_rests_and_why_not_nearer() {
     );
     let free = bench.report(&[&["run", "hybrid-elbow-down"], &quiet[..]].concat());
     assert_eq!(free["to_edge_m"], Value::Null);
+    // A doubt that costs little is not the whole reason.
+    let table = bench.run(&[
+        "run",
+        "edge",
+        "--set",
+        "controller.estimator.tip_deviation_m=0.0003",
+        "--set",
+        "controller.governor.p_per_kg=3.0",
+        "--no-record",
+        "--no-plot",
+    ]);
+    let table = String::from_utf8_lossy(&table.stdout);
+    assert!(
+        table.contains("mm short: controller.governor.p_per_kg keeps p at 3 or more, 0.2 mm of it because the tip"),
+        "{table}"
+    );
 }
 
 #[test]
