@@ -3,7 +3,7 @@
 use nalgebra::{Matrix2, Vector2};
 use painleve_firmware::law::LawSettings;
 use painleve_plant::scenario::Scenario;
-use painleve_plant::{Plant, PlantError};
+use painleve_plant::{ContactMode, Plant, PlantError};
 use painleve_shared::kinematics::Pose;
 use painleve_shared::{Arm, JointTorque};
 
@@ -22,6 +22,7 @@ const AT_REST_M: f64 = 1e-4;
 /// The loop in its state of rest.
 pub(super) struct AtRest {
     trial: Trial,
+    mode: ContactMode,
     arm: Arm<f64>,
     /// The commands: for each its torques per unit, and the weights with which it follows from the joints' torques.
     commands: [Command; 2],
@@ -46,6 +47,8 @@ pub(super) struct Recorded {
     pub(super) commands: [f64; 2],
     /// Normal force, N.
     pub(super) force_n: f64,
+    /// Whether the tip slides as at rest: if not, why there is no loop.
+    pub(super) slides: Result<(), NotHeld>,
 }
 
 /// Disturbances far from the edge: a quarter of a newton, and as much at the joints.
@@ -96,6 +99,10 @@ impl AtRest {
         if most_m - least_m > AT_REST_M || error_m > HELD_M {
             return Ok(Err(NotHeld::Restless));
         }
+        let mode = trial.simulation().plant().snapshot().mode;
+        if mode.slip().is_none() {
+            return Ok(Err(NotHeld::Sticks));
+        }
         let arm = Arm::new(scenario.arm)?;
         let jacobian = arm.jacobian(&Pose::new(&trial.theta_rad()));
         let Some(to_force) = jacobian.transpose().try_inverse() else {
@@ -114,6 +121,7 @@ impl AtRest {
         }
         Ok(Ok(Self {
             trial,
+            mode,
             arm,
             commands,
         }))
@@ -161,12 +169,18 @@ impl AtRest {
             trial.tick(&mut ())?;
             let simulation = trial.simulation();
             let torque_nm = simulation.command_nm().to_array();
+            let plant = simulation.plant().snapshot();
             recorded.push(Recorded {
                 commands: self.commands.map(|command| {
                     let [first, second] = command.weights;
                     first * torque_nm[0] + second * torque_nm[1]
                 }),
-                force_n: simulation.plant().snapshot().normal_force_n,
+                force_n: plant.normal_force_n,
+                slides: match plant.mode {
+                    mode if mode == self.mode => Ok(()),
+                    ContactMode::Flight => Err(NotHeld::LiftOff),
+                    _ => Err(NotHeld::Sticks),
+                },
             });
         }
         Ok(recorded)

@@ -79,6 +79,8 @@ pub enum NotHeld {
     Fault,
     /// The tip does not come to rest.
     Restless,
+    /// Friction holds the tip: it sticks to the belt, or even a small disturbance reverses its slip.
+    Sticks,
 }
 
 /// A controller that holds the tip at a place.

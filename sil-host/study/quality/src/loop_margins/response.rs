@@ -18,7 +18,8 @@ pub(super) const FAST_S: f64 = 8.0;
 const STARTS: usize = 8;
 /// Size of the disturbance of one tick, in that of a sine: it lasts a thousandth of a second. With a quarter of it, counts blur
 /// the response: near the arm's resonance, where the paper's PID has a gain of 60 dB, it is 14 % off, with this 2 %. Near the
-/// edge it may lift the tip off, whose flight is no part of the loop: then it is halved, down to the size of a sine.
+/// edge it may lift the tip off, and on a slow belt reverse its slip, which are no part of the loop: then it is halved, down to
+/// the size of a sine.
 const TICK_SIZE: f64 = 32.0;
 const LEAST_TICK_SIZE: f64 = 1.0;
 /// What the response of a stable loop still contains after some ticks is slow: from this tick on it is averaged over this
@@ -82,8 +83,8 @@ impl Linearised {
 }
 
 impl AtRest {
-    /// Linearises the loop of a command from its response of this duration, s; [`NotHeld::LiftOff`] if even a small disturbance
-    /// lifts the tip off.
+    /// Linearises the loop of a command from its response of this duration, s; [`NotHeld`] if even a small disturbance lifts the
+    /// tip off or ends its slip.
     ///
     /// # Errors
     /// [`StudyError`] if the plant cannot continue.
@@ -94,26 +95,29 @@ impl AtRest {
     ) -> Result<Result<Linearised, NotHeld>, StudyError> {
         let ticks = (duration_s * self.tick_hz()) as usize;
         let mut size = TICK_SIZE;
-        while size >= LEAST_TICK_SIZE {
+        loop {
             let height = size * self.command(number).size;
-            if let Some(response) = self.response(number, ticks, height)? {
-                return Ok(Ok(Linearised {
-                    response: smoothed(&response),
-                    tick_hz: self.tick_hz(),
-                }));
+            match self.response(number, ticks, height)? {
+                Ok(response) => {
+                    return Ok(Ok(Linearised {
+                        response: smoothed(&response),
+                        tick_hz: self.tick_hz(),
+                    }));
+                }
+                Err(reason) if size <= LEAST_TICK_SIZE => return Ok(Err(reason)),
+                Err(_) => size *= 0.5,
             }
-            size *= 0.5;
         }
-        Ok(Err(NotHeld::LiftOff))
     }
 
-    /// Returns the command after disturbances of this height, for one of one; `None` if the tip leaves the belt.
+    /// Returns the command after disturbances of this height, for one of one; [`NotHeld`] if the tip leaves the belt or its slip
+    /// ends.
     fn response(
         &self,
         number: usize,
         ticks: usize,
         height: f64,
-    ) -> Result<Option<Vec<f64>>, StudyError> {
+    ) -> Result<Result<Vec<f64>, NotHeld>, StudyError> {
         let mut response = vec![0.0; ticks];
         for start in 0..STARTS {
             let of = |sign: f64| {
@@ -123,15 +127,15 @@ impl AtRest {
                 recorded.map_err(|source| self.failed(number, source))
             };
             let (plus, minus) = (of(1.0)?, of(-1.0)?);
-            if plus.iter().chain(&minus).any(|it| it.force_n <= 0.0) {
-                return Ok(None);
+            if let Some(reason) = plus.iter().chain(&minus).find_map(|it| it.slides.err()) {
+                return Ok(Err(reason));
             }
             for (sum, (plus, minus)) in response.iter_mut().zip(plus.iter().zip(&minus)) {
                 let difference = plus.commands[number] - minus.commands[number];
                 *sum += difference / (2.0 * height * STARTS as f64);
             }
         }
-        Ok(Some(response))
+        Ok(Ok(response))
     }
 
     /// Measures the open loop of a command at frequencies (Hz) with sines.

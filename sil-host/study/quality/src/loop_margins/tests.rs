@@ -107,6 +107,21 @@ fn near_the_edge_no_flight_passes_for_the_loop() {
     assert!(margins.modulus > 0.15, "{margins:?}");
 }
 
+/// A disturbance of 32 times a sine's size reverses the slip on a belt of 20 mm/s: with it, the position's loop would seem to
+/// cross over at 476 Hz. On a faster belt it crosses over at 25 Hz.
+#[test]
+fn on_a_slow_belt_no_friction_at_rest_passes_for_the_loop() {
+    let on_belt = |speed_m_s: f64| LoopMargins {
+        overrides: vec![format!("belt.profile.speed_m_s={speed_m_s}")],
+        ..study("hybrid", &[0.0], 2)
+    };
+    let slow = on_belt(0.02).row(0).unwrap();
+    let crossover_hz = slow.loops[0].margins.crossover_hz.unwrap();
+    assert!((20.0..30.0).contains(&crossover_hz), "{crossover_hz}");
+    let standing = on_belt(0.0).row(0).unwrap();
+    assert_eq!(standing.not_held, Some(NotHeld::Sticks));
+}
+
 #[test]
 fn the_delay_of_ones_own_scenario_is_in_its_loop() {
     let folder = tempfile::tempdir().unwrap();
