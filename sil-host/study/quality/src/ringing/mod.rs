@@ -28,8 +28,6 @@ pub use outcome::RingingOutcome;
 
 /// The paper's law at 10 kHz with ideal converters, without additions.
 const SCENARIO: &str = "paper-gains";
-/// Posture of the arm: elbow up, p/Q22 falls slowly along half of the belt.
-const POSTURE: Posture = Posture::ElbowUp;
 /// Duration of a trial, and of its end in which the force is watched, s.
 const DURATION_S: f64 = 1.0;
 const WATCHED_S: f64 = 0.1;
@@ -66,11 +64,19 @@ pub struct Row {
     pub limit_p_ratio: Option<f64>,
 }
 
-/// The way to the edge along which p/Q22 falls to zero, as τ of the belt line.
+/// The way to the edge along which p/Q22 falls to zero, as τ of the belt line, or as −τ on a belt that runs along +t.
 #[derive(Clone, Copy, Debug)]
 struct Way {
     from: f64,
     to: f64,
+}
+
+/// Returns the direction of slip of a tip at rest, and the posture in which p/Q22 then falls slowly along half of the belt.
+fn slip_and_posture(base: &Scenario) -> (Slip, Posture) {
+    match base.slip_at_rest() {
+        Slip::Positive => (Slip::Positive, Posture::ElbowUp),
+        Slip::Negative => (Slip::Negative, Posture::ElbowDown),
+    }
 }
 
 impl Ringing {
@@ -107,8 +113,10 @@ impl Ringing {
         rate_per_s: f64,
         tip_t_m: f64,
     ) -> Result<Scenario, StudyError> {
-        let arm = Arm::new(self.base()?.moving_arm())?;
-        let line = BeltLine::new(&arm, POSTURE);
+        let base = self.base()?;
+        let arm = Arm::new(base.moving_arm())?;
+        let (_, posture) = slip_and_posture(&base);
+        let line = BeltLine::new(&arm, posture);
         let tau = line.tau(tip_t_m).ok_or_else(|| StudyError::OutOfReach {
             tip_t_m,
             reach_m: arm.reach_on_belt_m(),
@@ -121,10 +129,7 @@ impl Ringing {
             format!("contact.normal={{kelvin-voigt={{damping_ns_m={damping_ns_m:?}}}}}"),
             format!("initial.theta1_deg={:?}", theta.first().to_degrees()),
             format!("initial.theta2_deg={:?}", theta.second().to_degrees()),
-            format!(
-                "controller.friction.first_guess={:?}",
-                self.base()?.belt.friction
-            ),
+            format!("controller.friction.first_guess={:?}", base.belt.friction),
             "controller.law.hybrid.force_integral_gain_per_s=0".into(),
             format!(
                 "controller.law.hybrid.friction={{observed={{time_constant_s={:?}}}}}",
@@ -138,12 +143,13 @@ impl Ringing {
 
     /// Returns the way to the edge on which this belt drives the tip off.
     fn way(&self, arm: &Arm<f64>, base: &Scenario) -> Result<Way, StudyError> {
-        let line = BeltLine::new(arm, POSTURE);
-        let slip = slip(base);
-        let p = |tau| line.p_per_kg(tau, base.belt.friction, slip);
+        let (slip, posture) = slip_and_posture(base);
+        let line = BeltLine::new(arm, posture);
+        let sign: f64 = slip.sign();
+        let p = |tau| line.p_per_kg(sign * tau, base.belt.friction, slip);
         let last = positive_stretches(p).pop();
         let (low, to) = last.ok_or(StudyError::NothingAdmissible)?;
-        let ratio = |tau| line.p_ratio(tau, base.belt.friction, slip);
+        let ratio = |tau| line.p_ratio(sign * tau, base.belt.friction, slip);
         let step = (to - low) / PLACES as f64;
         let mut from = to;
         while from - step > low && ratio(from - step) > ratio(from) {
@@ -177,11 +183,6 @@ impl Ringing {
     }
 }
 
-/// Direction of slip of a tip at rest.
-fn slip(scenario: &Scenario) -> Slip {
-    scenario.slip_at_rest()
-}
-
 impl Study for Ringing {
     type Row = Row;
 
@@ -193,12 +194,14 @@ impl Study for Ringing {
         let (damping_ns_m, rate_per_s) = self.at(index);
         let base = self.base()?;
         let arm = Arm::new(base.moving_arm())?;
-        let line = BeltLine::new(&arm, POSTURE);
+        let (slip, posture) = slip_and_posture(&base);
+        let line = BeltLine::new(&arm, posture);
         let way = self.way(&arm, &base)?;
-        let ratio = |tau| line.p_ratio(tau, base.belt.friction, slip(&base));
-        let rings = |tau| self.rings(damping_ns_m, rate_per_s, line.tip_t_m(tau));
+        let sign: f64 = slip.sign();
+        let ratio = |tau| line.p_ratio(sign * tau, base.belt.friction, slip);
+        let rings = |tau| self.rings(damping_ns_m, rate_per_s, line.tip_t_m(sign * tau));
         let contact = |tau| {
-            let q22 = line.inverse_tip_inertia_per_kg(tau).m22;
+            let q22 = line.inverse_tip_inertia_per_kg(sign * tau).m22;
             ContactAtPlace {
                 stiffness_n_m: self.stiffness_n_m,
                 damping_ns_m,

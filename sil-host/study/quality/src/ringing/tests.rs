@@ -66,3 +66,22 @@ fn the_measured_onset_is_at_the_limit() {
         assert!(onset > 0.9 * limit && onset < most * limit, "{row:?}");
     }
 }
+
+/// The mirror image: with its elbow down, a relaxed spring to the other side, and a belt along +t.
+#[test]
+fn on_a_belt_along_t_the_mirrored_arm_rings_at_the_same_place() {
+    let onset = |overrides: &[&str]| {
+        let study = Ringing {
+            stiffness_n_m: 1e5,
+            dampings_ns_m: vec![76.0],
+            rates_per_s: vec![67.0],
+            overrides: overrides.iter().map(ToString::to_string).collect(),
+        };
+        study.check().unwrap();
+        study.row(0).unwrap().onset_p_ratio.unwrap()
+    };
+    let rest = 0.239_459_173_373_622_05;
+    let spring = format!("arm.spring_rest_rad=[0, {rest}]");
+    let (one, mirrored) = (onset(&[]), onset(&["belt.profile.speed_m_s=0.4", &spring]));
+    assert!((one - mirrored).abs() < 0.01 * one, "{one}, {mirrored}");
+}
