@@ -16,6 +16,7 @@ use std::collections::BTreeMap;
 
 use painleve_plant::belt_line::{BeltLine, positive_stretches};
 use painleve_plant::mechanics::BuiltInPlant;
+use painleve_plant::mechanics::compliant::ContactKind;
 use painleve_plant::scenario::Scenario;
 use painleve_plant::statistics::Statistics;
 use painleve_shared::{Arm, Posture, Slip};
@@ -327,7 +328,12 @@ impl Case<'_> {
             trial
                 .tick(&mut statistics)
                 .map_err(|source| StudyError::Plant { row: row(), source })?;
-            if statistics.lift_offs > 0 {
+            let lift_offs = match scenario.contact.kind {
+                ContactKind::Rigid => statistics.lift_offs,
+                // It starts without a force: the tip may bounce before it is captured.
+                ContactKind::Compliant => statistics.contact.lift_offs,
+            };
+            if lift_offs > 0 {
                 return Ok(Trialled::Failed(RangeEnd::LiftOff));
             }
             if trial.fault().is_some() {

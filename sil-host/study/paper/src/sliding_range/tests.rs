@@ -34,6 +34,18 @@ fn the_hybrid_law_goes_farther_than_in_the_paper_and_the_pid_lifts_off_elbow_up(
     assert_eq!(up.paper_m, None);
 }
 
+/// A run bounces twice before the tip is captured, and reaches the same target.
+#[test]
+fn on_a_compliant_contact_bounces_before_the_capture_do_not_end_the_range() {
+    let mut study = study(ControllerChoice::Hybrid, Posture::ElbowDown);
+    study.overrides = vec!["contact.kind='compliant'".into()];
+    let row = study.row(0).unwrap();
+    assert!(
+        row.z_sliding_m.is_some_and(|reached_m| reached_m > 0.16),
+        "{row:?}"
+    );
+}
+
 /// The paper's arm is symmetric: its mirror image has the other posture, slip and direction.
 #[test]
 fn on_a_belt_that_runs_the_other_way_the_tip_slides_the_other_way() {
