@@ -49,10 +49,12 @@ fn scenario_of<'a>(run: &'a Run, first: &'a Scenario) -> &'a Scenario {
 fn rows(run: &Run, scenario: &Scenario) -> Vec<u8> {
     let mut follower = Follower::new(scenario);
     let mut rows = Thinned::default();
+    // What a simulated arm does not have, such as a reference after a fault, no estimate replaces.
+    let sources = 1 + usize::from(!run.table.knows("plant.p_per_kg"));
     for (tick, &time_s) in run.table.time_s.iter().enumerate() {
         let known = |names: [&str; 2]| {
             let value = |name: &str| run.table.column(name).get(tick).copied();
-            let mut values = names.into_iter().filter_map(value);
+            let mut values = names.into_iter().take(sources).filter_map(value);
             values.find(|value| value.is_finite()).unwrap_or(f64::NAN)
         };
         let [belt_m_s, p_per_kg] =
@@ -164,6 +166,28 @@ mod tests {
         assert_eq!(events_of(&rows("")).0, [fault]);
         let nothing = events_of("time_s,estimates.tip_t_m\n0,0\n1,0\n2,0\n");
         assert_eq!(nothing.0, Vec::<Value>::new());
+    }
+
+    #[test]
+    fn only_a_real_arm_has_estimates_for_what_is_not_known() {
+        let header = "time_s,plant.p_per_kg,plant.reference_tip_t_m,estimates.reference_m";
+        let reference = |p: &str| {
+            let text = format!("{header}\n0,{p},,0.25\n");
+            let run = Run {
+                label: "run".into(),
+                table: RunTable::of_csv(text.as_bytes(), &COLUMNS).unwrap(),
+                scenario: None,
+            };
+            let bytes = rows(&run, &Scenario::default());
+            let at = 8 + 4 * crate::row::COLUMNS
+                .iter()
+                .position(|name| *name == "reference_m")
+                .unwrap();
+            f32::from_le_bytes(bytes[at..at + 4].try_into().unwrap())
+        };
+        assert_eq!(reference(""), 0.25);
+        // After a fault, or before ENABLE.
+        assert!(reference("1.5").is_nan());
     }
 
     #[test]
