@@ -313,13 +313,18 @@ fn temporary(place: &OutputPlace) -> io::Result<(File, OsString)> {
             Err(Errno::EEXIST) => continue,
             file => File::from(file?),
         };
-        // On a file system without locks, abandoned files are not removed either.
-        let _ = file.try_lock();
-        // Before it was locked, another process may have removed it as abandoned.
-        if existing(place, &name).is_ok() {
+        if lock_new(place, &file, &name) {
             return Ok((file, name));
         }
+        let _ = remove(place, &name);
     }
+}
+
+/// Locks a new temporary file. Returns `false` if another process, to which it looked abandoned until then, has locked or
+/// removed it.
+fn lock_new(place: &OutputPlace, file: &File, name: &OsStr) -> bool {
+    // On a file system without locks, abandoned files are not removed either.
+    !matches!(file.try_lock(), Err(TryLockError::WouldBlock)) && existing(place, name).is_ok()
 }
 
 const SUFFIX: &str = ".part";
@@ -632,6 +637,21 @@ mod tests {
         let mut found = names(folder.path());
         found.sort();
         assert_eq!(found, ["a", "b"]);
+    }
+
+    #[test]
+    fn a_new_file_that_another_process_has_locked_or_removed_is_not_used() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("new");
+        let place = OutputPlace::find(&path).unwrap();
+        let file = File::create(&path).unwrap();
+        let looked_at = File::open(&path).unwrap();
+        looked_at.lock().unwrap();
+        assert!(!lock_new(&place, &file, OsStr::new("new")));
+        drop(looked_at);
+        assert!(lock_new(&place, &file, OsStr::new("new")));
+        fs::remove_file(&path).unwrap();
+        assert!(!lock_new(&place, &file, OsStr::new("new")));
     }
 
     #[test]
