@@ -140,7 +140,7 @@ impl<W: Write + Seek> Bag<W> {
             // An event.
             return Ok(());
         };
-        let fields: Map<String, Value> =
+        let mut fields: Map<String, Value> =
             serde_json::from_slice(message.json).map_err(|source| Damage::Message {
                 topic: topic.name,
                 source,
@@ -170,8 +170,11 @@ impl<W: Write + Seek> Bag<W> {
                 self.state_ns = stamp_ns;
             }
             // What no sensor of a real arm measures is known as an estimate.
-            for (name, value) in fields.into_iter().filter(|(_, value)| !value.is_null()) {
-                self.state.entry(name).or_insert(value);
+            for field in topic.fields {
+                let value = fields.remove(field.name).filter(|value| !value.is_null());
+                if let Some(value) = value {
+                    self.state.entry(field.name).or_insert(value);
+                }
             }
         }
         Ok(())
@@ -330,7 +333,7 @@ mod tests {
         for (name, json) in [
             (
                 PLANT.name,
-                r#"{"theta1_rad": 0.1, "theta1_dot_rad_s": null}"#,
+                r#"{"theta1_rad": 0.1, "theta1_dot_rad_s": null, "unknown": 1}"#,
             ),
             (
                 ESTIMATES.name,
@@ -347,6 +350,8 @@ mod tests {
         }
         assert_eq!(bag.state["theta1_rad"], 0.1);
         assert_eq!(bag.state["theta1_dot_rad_s"], 2.0);
+        // Others would be held until the time changes, which it need not.
+        assert_eq!(bag.state.len(), 2);
     }
 
     #[test]
