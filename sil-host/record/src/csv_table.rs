@@ -3,8 +3,10 @@
 //! The first column is `time_s`; the others are named by topic and field of the MCAP file, for
 //! example `plant.tip_t_m`. A cell is empty if its quantity is not finite or unknown.
 
+use std::io;
 use std::path::PathBuf;
 
+use csv::StringRecord;
 use painleve_files::atomic_file::AtomicFile;
 
 use crate::fields::{Read, TOPICS};
@@ -49,6 +51,48 @@ pub(crate) fn decimal(value: impl serde::Serialize) -> String {
     match serde_json::to_string(&value) {
         Ok(text) if text != "null" => text,
         _ => String::new(),
+    }
+}
+
+/// Longest row of a table that is read, bytes. Those of a run have a thousand.
+const LONGEST_ROW: u64 = 1 << 16;
+
+/// Reads a table, which may come from anywhere: nothing longer than [`LONGEST_ROW`] is held.
+pub struct TableReader<R>(csv::Reader<io::Take<R>>);
+
+impl<R: io::Read> TableReader<R> {
+    /// Reads nothing yet.
+    pub fn new(table: R) -> Self {
+        Self(csv::Reader::from_reader(table.take(LONGEST_ROW)))
+    }
+
+    /// Returns the names of the columns.
+    ///
+    /// # Errors
+    /// [`csv::Error`] if they cannot be read.
+    pub fn header(&mut self) -> csv::Result<StringRecord> {
+        let header = self.0.headers().cloned();
+        self.bounded(header)
+    }
+
+    /// Reads the next row; `false` at the end.
+    ///
+    /// # Errors
+    /// [`csv::Error`] if it cannot be read.
+    pub fn read(&mut self, row: &mut StringRecord) -> csv::Result<bool> {
+        let read = self.0.read_record(row);
+        self.bounded(read)
+    }
+
+    /// Refuses what was read if it ended at the limit, and sets the limit for the next row.
+    fn bounded<T>(&mut self, read: csv::Result<T>) -> csv::Result<T> {
+        let table = self.0.get_mut();
+        if table.limit() == 0 {
+            let reason = format!("a row has more than {LONGEST_ROW} bytes");
+            return Err(io::Error::new(io::ErrorKind::InvalidData, reason).into());
+        }
+        table.set_limit(LONGEST_ROW);
+        read
     }
 }
 

@@ -2,7 +2,8 @@
 
 use std::borrow::Cow;
 use std::fmt;
-use std::io::{Read, Write};
+use std::io::{self, PipeReader, Read, Write};
+use std::thread;
 
 use serde::de::{DeserializeSeed, Deserializer, IgnoredAny, MapAccess, Visitor};
 use serde_json::value::RawValue;
@@ -101,8 +102,34 @@ pub fn ticks_to_csv(record: impl Read, output: impl Write) -> Result<Exported, E
     ticks_and_events(record, output, |_| Ok(()))
 }
 
+/// Passes the table of a whole record on while it is written, so that memory does not grow with it, and the JSON of every
+/// event.
+///
+/// # Errors
+/// [`ExportError`] if the record is damaged, has no ticks or is not read to its end; what `read` refuses is its own error.
+pub fn read_as_table<T, E>(
+    record: impl Read + Send,
+    event: impl FnMut(&[u8]) -> serde_json::Result<()> + Send,
+    read: impl FnOnce(PipeReader) -> Result<T, E>,
+) -> Result<Result<T, E>, ExportError> {
+    let (reader, writer) = io::pipe().map_err(csv::Error::from)?;
+    thread::scope(|scope| {
+        let exported =
+            scope.spawn(move || ticks_and_events(record, io::BufWriter::new(writer), event));
+        // Owned, so that a table that is refused closes the pipe.
+        let table = read(reader);
+        match exported.join() {
+            Ok(Ok(exported)) => exported.whole().map(|_| table),
+            // Why it was refused says more than the broken pipe.
+            Ok(Err(ExportError::Write(_))) if table.is_err() => Ok(table),
+            Ok(Err(error)) => Err(error),
+            Err(panic) => std::panic::resume_unwind(panic),
+        }
+    })
+}
+
 /// As [`ticks_to_csv`]; passes the JSON of every event on.
-pub(crate) fn ticks_and_events(
+fn ticks_and_events(
     record: impl Read,
     output: impl Write,
     mut event: impl FnMut(&[u8]) -> serde_json::Result<()>,

@@ -1,17 +1,17 @@
 //! The ticks of a run as columns of numbers, read from a record or from its table.
 
 use std::borrow::Cow;
-use std::io::{self, BufReader, Read};
-use std::thread;
+use std::io::Read;
 
 use serde::Deserialize;
 
-use crate::export::{ExportError, ticks_and_events};
+use crate::csv_table::TableReader;
+use crate::export::{ExportError, read_as_table};
 
 /// Name of the column of times.
 const TIME: &str = "time_s";
 /// Most ticks of a run that is held in memory: some hundred megabytes.
-const MOST_TICKS: usize = 2_000_000;
+pub const MOST_TICKS: usize = 2_000_000;
 
 /// Why a table cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -20,14 +20,11 @@ pub enum TableError {
     #[error(transparent)]
     Record(#[from] ExportError),
     /// The file cannot be read, or is no table.
-    #[error("line {}: {source}", .source.position().map_or(1, csv::Position::line))]
+    #[error("{}{source}", .source.position().map_or_else(String::new, |at| format!("line {}: ", at.line())))]
     Csv {
         /// The reason.
         source: csv::Error,
     },
-    /// The system refuses a pipe.
-    #[error(transparent)]
-    Pipe(#[from] io::Error),
     /// A column is missing.
     #[error(
         "it has no column {0}: this is not a table of a run's ticks, as `painleve export --csv` writes"
@@ -82,37 +79,21 @@ impl RunTable {
     /// # Errors
     /// [`TableError`] if it is damaged or has no ticks.
     pub fn of_record(record: impl Read + Send, names: &[&'static str]) -> Result<Self, TableError> {
-        let (reader, writer) = io::pipe()?;
-        thread::scope(|scope| {
-            let exported = scope.spawn(move || {
-                let mut lift_offs_s = Vec::new();
-                ticks_and_events(record, io::BufWriter::new(writer), |json| {
-                    let event: EventTime<'_> = serde_json::from_slice(json)?;
-                    if event.kind == "lift-off" && lift_offs_s.len() <= MOST_TICKS {
-                        lift_offs_s.push(event.time_s);
-                    }
-                    Ok(())
-                })
-                .map(|exported| (exported, lift_offs_s))
-            });
-            // Owned, so that a table that is refused closes the pipe.
-            let table = Self::read(BufReader::new(reader), names, true);
-            match exported.join() {
-                Ok(Ok((exported, lift_offs_s))) => {
-                    exported.whole()?;
-                    if lift_offs_s.len() > MOST_TICKS {
-                        return Err(TableError::TooLong);
-                    }
-                    table.map(|table| Self {
-                        lift_offs_s: Some(lift_offs_s),
-                        ..table
-                    })
-                }
-                // Why it was refused says more than the broken pipe.
-                Ok(Err(ExportError::Write(_))) if table.is_err() => table,
-                Ok(Err(error)) => Err(error.into()),
-                Err(panic) => std::panic::resume_unwind(panic),
+        let mut lift_offs_s = Vec::new();
+        let event = |json: &[u8]| {
+            let event: EventTime<'_> = serde_json::from_slice(json)?;
+            if event.kind == "lift-off" && lift_offs_s.len() <= MOST_TICKS {
+                lift_offs_s.push(event.time_s);
             }
+            Ok(())
+        };
+        let table = read_as_table(record, event, |table| Self::read(table, names, true))?;
+        if lift_offs_s.len() > MOST_TICKS {
+            return Err(TableError::TooLong);
+        }
+        Ok(Self {
+            lift_offs_s: Some(lift_offs_s),
+            ..table?
         })
     }
 
@@ -127,8 +108,8 @@ impl RunTable {
     /// Reads the named columns of a table, of which the user knows the lines, or the times if it is `of_record`.
     fn read(table: impl Read, names: &[&'static str], of_record: bool) -> Result<Self, TableError> {
         let wrong = |source| TableError::Csv { source };
-        let mut reader = csv::Reader::from_reader(table);
-        let header = reader.headers().map_err(wrong)?.clone();
+        let mut reader = TableReader::new(table);
+        let header = reader.header().map_err(wrong)?;
         let place = |name: &str| header.iter().position(|column| column == name);
         let time = place(TIME).ok_or(TableError::NoColumn(TIME))?;
         let places: Vec<Option<usize>> = names.iter().map(|name| place(name)).collect();
@@ -142,7 +123,7 @@ impl RunTable {
             names: names.to_vec(),
         };
         let mut row = csv::StringRecord::new();
-        while reader.read_record(&mut row).map_err(wrong)? {
+        while reader.read(&mut row).map_err(wrong)? {
             let place = |when: &str, time_s: f64| match row.position() {
                 Some(position) if !of_record => format!("line {}", position.line()),
                 _ => format!("{when} {time_s} s"),
@@ -224,6 +205,8 @@ fn number(row: &csv::StringRecord, place: Option<usize>) -> Result<f64, String> 
 
 #[cfg(test)]
 mod tests {
+    use std::io;
+
     use super::*;
     use crate::mcap_log::tests::of_messages;
 
@@ -263,6 +246,19 @@ mod tests {
             let record = of_messages("/plant", &[(1_500_000_000, "{}"), second]);
             let error = RunTable::of_record(&record[..], &NAMES).unwrap_err();
             assert_eq!(error.to_string(), message);
+        }
+    }
+
+    #[test]
+    fn whatever_takes_the_place_of_a_row_is_not_held_in_memory() {
+        for (start, byte) in [
+            ("", b'1'),
+            ("time_s,plant.tip_t_m\n0,", b'1'),
+            ("time_s,plant.tip_t_m\n0,\"", b'\n'),
+        ] {
+            let table = start.as_bytes().chain(io::repeat(byte).take(1 << 20));
+            let error = RunTable::of_csv(table, &NAMES).unwrap_err();
+            assert_eq!(error.to_string(), "a row has more than 65536 bytes");
         }
     }
 

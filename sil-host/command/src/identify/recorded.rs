@@ -5,12 +5,15 @@ use std::path::PathBuf;
 use std::str::FromStr;
 
 use clap::ValueEnum;
+use csv::StringRecord;
 use painleve_commission::identification::{SlideTick, slide_of};
 use painleve_files::input_file;
 use painleve_identify::Slide;
 use painleve_plant::scenario::Scenario;
-use painleve_record::export::{Exported, ticks_to_csv};
+use painleve_record::csv_table::TableReader;
+use painleve_record::export::read_as_table;
 use painleve_record::mcap_log::Source;
+use painleve_record::run_table::MOST_TICKS;
 use painleve_shared::counts::{EncoderCounts, ForceCounts, TorqueCounts};
 use painleve_shared::frame::SensorFrame;
 use painleve_study_core::options::PostureOption;
@@ -120,11 +123,8 @@ impl Recorded {
         if self.is_table() {
             return of_table(BufReader::new(file));
         }
-        let mut table = Vec::new();
-        let exported = ticks_to_csv(BufReader::new(file), &mut table);
-        let whole = exported.and_then(Exported::whole);
-        whole.map_err(|error| error.to_string())?;
-        of_table(table.as_slice())
+        let file = BufReader::with_capacity(1 << 20, file);
+        read_as_table(file, |_| Ok(()), of_table).map_err(|error| error.to_string())?
     }
 }
 
@@ -148,8 +148,8 @@ pub fn check_distinct(given: &[Recorded], slides: &[Slide]) -> Result<(), InputE
 
 /// Reads the ticks of a table.
 fn of_table(table: impl Read) -> Result<Vec<SlideTick>, String> {
-    let mut reader = csv::Reader::from_reader(table);
-    let header = reader.headers().map_err(|error| error.to_string())?.clone();
+    let mut reader = TableReader::new(table);
+    let header = reader.header().map_err(|error| error.to_string())?;
     let place = |name: &str| header.iter().position(|column| column == name);
     let mut places = [0; COLUMNS.len()];
     for (at, name) in places.iter_mut().zip(COLUMNS) {
@@ -157,9 +157,11 @@ fn of_table(table: impl Read) -> Result<Vec<SlideTick>, String> {
     }
     let (state, counted) = STATE;
     let (state, tick) = (place(state), place(TICK));
-    let mut ticks = Vec::new();
-    for (number, row) in (0_u32..).zip(reader.records()) {
-        let row = row.map_err(|error| error.to_string())?;
+    let (mut ticks, mut row) = (Vec::new(), StringRecord::new());
+    for number in 0_u32.. {
+        if !reader.read(&mut row).map_err(|error| error.to_string())? {
+            break;
+        }
         if state.is_some_and(|at| row.get(at).is_none_or(|it| !counted.contains(&it))) {
             continue;
         }
@@ -187,6 +189,9 @@ fn of_table(table: impl Read) -> Result<Vec<SlideTick>, String> {
         let joint = |counts| EncoderCounts(u32::try_from(counts).unwrap_or(u32::MAX));
         let force = |counts| ForceCounts(i32::try_from(counts).unwrap_or(i32::MAX));
         let torque = |counts| TorqueCounts(i32::try_from(counts).unwrap_or(i32::MAX));
+        if ticks.len() >= MOST_TICKS {
+            return Err(format!("it has more than {MOST_TICKS} ticks of a slide"));
+        }
         ticks.push(SlideTick {
             sensor: SensorFrame {
                 tick,
@@ -237,6 +242,8 @@ mod tests {
             of_table(backwards.as_bytes()).unwrap_err(),
             "sensor.tick = 7 does not come after the tick before it"
         );
+        let endless = of_table(std::io::repeat(b'1').take(1 << 20));
+        assert_eq!(endless.unwrap_err(), "a row has more than 65536 bytes");
         let header = COLUMNS.join(",");
         let wrong = of_table(format!("{header}\n1,x,3,4,5,6\n").as_bytes());
         assert_eq!(
