@@ -1,12 +1,15 @@
 //! The operator's commands: lines on standard input.
 
-use std::io::{self, BufRead};
+use std::io::{self, BufRead, Read as _};
 use std::sync::mpsc::{Receiver, SyncSender, TryRecvError, sync_channel};
 
 use painleve_process::terminal::warn;
 
 /// Most commands that wait; further input is not read until then.
 const MOST_WAITING: usize = 16;
+
+/// Longest line that is held, bytes.
+const LONGEST: u64 = 256;
 
 /// A command to the drive.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -108,10 +111,19 @@ impl Operator {
 fn pass_on(mut input: impl BufRead, commands: &SyncSender<OperatorCommand>) {
     let mut line = Vec::new();
     while input
+        .by_ref()
+        .take(LONGEST)
         .read_until(b'\n', &mut line)
         .is_ok_and(|read| read > 0)
     {
-        let command = OperatorCommand::of(&String::from_utf8_lossy(&line));
+        let text = String::from_utf8_lossy(&line);
+        // A part of a longer line could read like a command.
+        let is_part = !line.ends_with(b"\n") && input.skip_until(b'\n').is_ok_and(|rest| rest > 0);
+        let command = if is_part {
+            OperatorCommand::Unknown(text.into_owned())
+        } else {
+            OperatorCommand::of(&text)
+        };
         if commands.send(command).is_err() {
             return;
         }
@@ -148,6 +160,21 @@ mod tests {
         assert_eq!(operator.order(), Some(unknown));
         assert_eq!(operator.order(), Some(OperatorCommand::Stop));
         for _ in 0..2 {
+            assert_eq!(operator.order(), Some(OperatorCommand::End));
+        }
+    }
+
+    #[test]
+    fn no_part_of_a_long_line_is_a_command() {
+        let longest = LONGEST as usize;
+        for line in [
+            format!("{}arm\n", "x".repeat(longest)),
+            format!("arm{}ed", " ".repeat(longest)),
+            format!("{}\n", " ".repeat(longest)),
+        ] {
+            let operator = typed(line.as_bytes());
+            let held = line[..longest].to_owned();
+            assert_eq!(operator.order(), Some(OperatorCommand::Unknown(held)));
             assert_eq!(operator.order(), Some(OperatorCommand::End));
         }
     }
