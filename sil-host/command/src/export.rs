@@ -1,6 +1,7 @@
 //! `painleve export`: the ticks of a record as a table.
 
-use std::io::{self, BufReader, Seek, SeekFrom, Write};
+use std::fs::File;
+use std::io::{self, BufReader, Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
 use clap::{ArgGroup, Args};
@@ -36,21 +37,37 @@ pub struct ExportArguments {
     json: bool,
 }
 
-/// A file that takes nothing more once the user has interrupted, so that it is removed rather than left behind.
-struct Interruptible<'a, W> {
-    file: W,
+/// A file that gives and takes nothing more once the user has interrupted, so that an output is removed rather than left
+/// behind.
+struct Interruptible<'a, F> {
+    file: F,
     interrupt: &'a Interrupt,
+}
+
+impl<F> Interruptible<'_, F> {
+    fn check(&self) -> io::Result<()> {
+        match self.interrupt.is_requested() {
+            true => Err(io::Error::other("interrupted")),
+            false => Ok(()),
+        }
+    }
+}
+
+impl<R: Read> Read for Interruptible<'_, R> {
+    fn read(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
+        self.check()?;
+        self.file.read(bytes)
+    }
 }
 
 impl<W: Write> Write for Interruptible<'_, W> {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        if self.interrupt.is_requested() {
-            return Err(io::Error::other("interrupted"));
-        }
+        self.check()?;
         self.file.write(bytes)
     }
 
     fn flush(&mut self) -> io::Result<()> {
+        self.check()?;
         self.file.flush()
     }
 }
@@ -146,6 +163,16 @@ fn export_all(arguments: &ExportArguments, interrupt: &Interrupt) -> Result<(), 
     Ok(())
 }
 
+/// Opens the record.
+fn open<'a>(
+    arguments: &ExportArguments,
+    interrupt: &'a Interrupt,
+) -> Result<BufReader<Interruptible<'a, File>>, CommandError> {
+    let file = record_error(arguments, input_file::open(&arguments.record))?;
+    let file = Interruptible { file, interrupt };
+    Ok(BufReader::with_capacity(1 << 20, file))
+}
+
 /// Writes the ticks of the record as CSV to what becomes the file at `path`.
 fn export(
     arguments: &ExportArguments,
@@ -153,9 +180,8 @@ fn export(
     file: impl Write,
     interrupt: &Interrupt,
 ) -> Result<Exported, CommandError> {
-    let record = record_error(arguments, input_file::open(&arguments.record))?;
     let table = Interruptible { file, interrupt };
-    let exported = ticks_to_csv(BufReader::with_capacity(1 << 20, record), table);
+    let exported = ticks_to_csv(open(arguments, interrupt)?, table);
     let wanted = match exported {
         Ok(exported) if !arguments.recover => exported.whole(),
         exported => exported,
@@ -169,7 +195,7 @@ fn export_bag(
     path: &Path,
     interrupt: &Interrupt,
 ) -> Result<(AtomicFile, u64), CommandError> {
-    let open = || record_error(arguments, input_file::open(&arguments.record)).map(BufReader::new);
+    let open = || open(arguments, interrupt);
     let notes = record_file::notes(open()?).map_err(ExportError::from);
     let notes = record_error(arguments, notes)?.unwrap_or_default();
     // Records of earlier versions do not tell when they began.

@@ -3,7 +3,7 @@
 
 use std::fs::{self, File};
 use std::io::Write;
-use std::os::unix::fs::{MetadataExt, PermissionsExt};
+use std::os::unix::fs::{FileExt, MetadataExt, PermissionsExt};
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
@@ -381,6 +381,46 @@ fn an_interrupted_export_leaves_nothing() {
         assert_eq!(code(output.status), 130, "{output:?}");
         assert_eq!(errors(&output), "error: interrupted\n");
         assert_eq!(bench.files(), before);
+    }
+}
+
+#[test]
+fn an_export_that_finds_nothing_to_write_can_be_interrupted() {
+    let bench = Bench::new("foreign-export");
+    let path = bench.path("foreign.mcap");
+    let file = File::create(&path).unwrap();
+    let record = |kind: u8, content: &[u8]| {
+        let length = (content.len() as u64).to_le_bytes();
+        [&[kind][..], &length, content].concat()
+    };
+    let header = record(1, &[0; 8]);
+    // Channel 0 of the topic "a".
+    let channel = record(4, b"\0\0\0\0\x01\0\0\0a\0\0\0\0\0\0\0\0");
+    let head = [&b"\x89MCAP0\r\n"[..], &header, &channel].concat();
+    file.write_all_at(&head, 0).unwrap();
+    // Its messages are holes in the file, which take a minute to read.
+    let length = 4_u64 << 20;
+    for message in 0..20_000 {
+        let start = [&[5][..], &length.to_le_bytes()].concat();
+        let at = head.len() as u64 + message * (start.len() as u64 + length);
+        file.write_all_at(&start, at).unwrap();
+    }
+    for format in ["--csv=new.csv", "--ros2=new.mcap"] {
+        let running = bench.start(&["export", "foreign.mcap", format]);
+        let descriptors = format!("/proc/{}/fd", running.id());
+        let is_read = || {
+            let open = fs::read_dir(&descriptors).into_iter().flatten().flatten();
+            let mut files = open.filter_map(|it| fs::read_link(it.path()).ok());
+            files.any(|file| file == path)
+        };
+        while !is_read() && is_running(running.id()) {
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        signal(running.id(), Signal::SIGINT);
+        let (output, _) = running.end(SOON);
+        assert_eq!(code(output.status), 130, "{output:?}");
+        assert_eq!(errors(&output), "error: interrupted\n");
+        assert_eq!(bench.files(), ["foreign.mcap"]);
     }
 }
 
