@@ -1,11 +1,14 @@
 //! What a process of a run is to do, as `painleve run` hands it over: the options of its subcommand, serialised.
 //!
-//! The process is started as `painleve NAME --plan PLAN`, an option that the parser of the command line does not know.
+//! The process is started as `painleve NAME --plan PLAN PARENT`, an option that the parser of the command line does not know;
+//! PARENT is the id of the process that starts it.
 
 use std::path::Path;
 use std::process::Command;
 
 use clap::Subcommand;
+use nix::unistd::Pid;
+use painleve_process::lifetime::{Signal, end_this_with, end_with_parent};
 use serde::{Deserialize, Serialize};
 
 use super::bridge::BridgeArguments;
@@ -13,6 +16,9 @@ use super::controller::ControllerArguments;
 use super::plant::PlantArguments;
 
 const OPTION: &str = "--plan";
+
+/// What a process of a run receives when the run ends without it.
+const END: Signal = Signal::SIGTERM;
 
 /// A process of a run: its subcommand and options.
 #[derive(Debug, Subcommand, Serialize, Deserialize)]
@@ -26,7 +32,7 @@ pub enum Plan {
 }
 
 impl Plan {
-    /// Returns the command that starts the process.
+    /// Returns the command that starts the process, which ends with this one.
     ///
     /// # Errors
     /// If the plan cannot be serialised, which plain structs can.
@@ -38,14 +44,20 @@ impl Plan {
         };
         let mut command = Command::new(program);
         command.args([name, OPTION, &serde_json::to_string(self)?]);
+        command.arg(std::process::id().to_string());
+        end_with_parent(&mut command, END);
         Ok(command)
     }
 
-    /// Returns the plan of this process, if `run` has started it.
+    /// Returns the plan of this process, if a `run` has started it that still runs.
     pub fn of_this_process() -> Option<Self> {
         let arguments: Vec<_> = std::env::args_os().skip(2).collect();
         match arguments.as_slice() {
-            [option, plan] if option == OPTION => serde_json::from_str(plan.to_str()?).ok(),
+            [option, plan, parent] if option == OPTION => {
+                let parent = Pid::from_raw(parent.to_str()?.parse().ok()?);
+                end_this_with(parent, END).ok()?;
+                serde_json::from_str(plan.to_str()?).ok()
+            }
             _ => None,
         }
     }

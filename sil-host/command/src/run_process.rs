@@ -5,7 +5,7 @@ use std::process::{ExitStatus, Stdio};
 use std::sync::mpsc::{Receiver, channel};
 use std::time::Duration;
 
-use painleve_process::lifetime::{Guarded, Signal, end_with_parent};
+use painleve_process::lifetime::Guarded;
 
 use super::CommandError;
 use super::plan::Plan;
@@ -37,7 +37,7 @@ impl RunProcess {
             .stdin(Stdio::null())
             .stdout(Stdio::piped())
             .stderr(stderr);
-        let mut child = end_with_parent(&mut command, Signal::SIGTERM)
+        let mut child = command
             .spawn()
             .map_err(|source| ProcessError::Start { program, source })?;
         let (stdout, stderr) = (child.stdout.take(), child.stderr.take());

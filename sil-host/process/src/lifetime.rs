@@ -20,18 +20,24 @@ use nix::unistd::{Pid, getpid, getppid};
 #[allow(unsafe_code)]
 pub fn end_with_parent(command: &mut Command, signal: Signal) -> &mut Command {
     let parent = getpid();
-    let request = move || {
-        set_pdeathsig(signal)?;
-        // Without this check, a parent that ended before the request would go unnoticed.
-        if getppid() == parent {
-            Ok(())
-        } else {
-            Err(io::Error::from_raw_os_error(Errno::ESRCH as i32))
-        }
-    };
     // SAFETY: the closure runs between fork and exec, where only async-signal-safe calls are
     // allowed; it makes two system calls and does not allocate.
-    unsafe { command.pre_exec(request) }
+    unsafe { command.pre_exec(move || end_this_with(parent, signal)) }
+}
+
+/// Makes the kernel send `signal` to this process when `parent`, which has started it with [`end_with_parent`], ends. A
+/// program that has capabilities of its own (`setcap`) must ask again: the kernel forgets the request when it starts one.
+///
+/// # Errors
+/// If the parent has ended.
+pub fn end_this_with(parent: Pid, signal: Signal) -> io::Result<()> {
+    set_pdeathsig(signal)?;
+    // Without this check, a parent that ended before the request would go unnoticed.
+    if getppid() == parent {
+        Ok(())
+    } else {
+        Err(io::Error::from_raw_os_error(Errno::ESRCH as i32))
+    }
 }
 
 /// A child that is ended, by force if necessary, when this value is dropped.

@@ -1,12 +1,13 @@
 //! Every failure ends with one message, an exit code, and no leftovers.
 
-use std::os::unix::fs::PermissionsExt;
-use std::process::{Output, Stdio};
+use std::os::unix::fs::{PermissionsExt, chown};
+use std::process::{Command, Output, Stdio};
 use std::sync::Barrier;
 use std::time::Duration;
 
 use nix::sys::signal::Signal;
-use painleve_tests::{Bench, child_of, code, errors, is_running, signal};
+use nix::unistd::Uid;
+use painleve_tests::{Bench, child_of, code, errors, is_running, program, signal, skipped};
 use serde_json::Value;
 
 /// A peer detects the end of the other within 2 s; the margin is for a machine busy with other
@@ -286,6 +287,46 @@ fn a_stopped_controller_ends_the_run() {
 #[test]
 fn killing_a_run_ends_its_processes() {
     kill_and_watch("kill-run", "run", Signal::SIGKILL);
+}
+
+/// The kernel forgets with whom a process ends when it starts a program that has more capabilities than its user.
+#[test]
+fn killing_a_run_with_capabilities_ends_its_processes() {
+    const NOBODY: u32 = 65534;
+    let bench = Bench::new("capable");
+    let copy = bench.path("painleve");
+    std::fs::copy(program(), &copy).unwrap();
+    let mut setcap = Command::new("setcap");
+    let capable = setcap.arg("cap_sys_nice+ep").arg(&copy).output();
+    if !Uid::effective().is_root() || !capable.is_ok_and(|it| it.status.success()) {
+        return skipped("only root can give a program capabilities, with `setcap`");
+    }
+    chown(bench.path("."), Some(NOBODY), Some(NOBODY)).unwrap();
+    let mut run = Command::new("setpriv");
+    run.arg(format!("--reuid={NOBODY}"))
+        .arg(format!("--regid={NOBODY}"))
+        .arg("--clear-groups")
+        .arg(&copy)
+        .args(LONG)
+        .args(["--no-record", "--no-plot"])
+        .current_dir(bench.path("."))
+        .env("XDG_RUNTIME_DIR", bench.path("."))
+        .stdout(Stdio::null());
+    let mut run = run.spawn().unwrap();
+    let id = run.id().cast_signed();
+    let children = ["plant", "controller"].map(|name| child_of(id, name));
+    std::thread::sleep(Duration::from_millis(400));
+    signal(id, Signal::SIGKILL);
+    run.wait().unwrap();
+    let start = std::time::Instant::now();
+    while children.into_iter().any(is_running) && start.elapsed() < NOTICE {
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    let left = children.into_iter().filter(|child| is_running(*child));
+    let left: Vec<_> = left
+        .inspect(|child| signal(*child, Signal::SIGKILL))
+        .collect();
+    assert!(left.is_empty(), "left running: {left:?}");
 }
 
 #[test]
