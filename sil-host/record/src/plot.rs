@@ -123,7 +123,7 @@ impl RunPlot {
         let mut flags = flag::mode(plant.mode) | self.pending;
         self.pending = 0;
         if let Some(paradox) = &mut self.paradox {
-            let distance = paradox.measure(&plant.theta_rad, plant.p_per_kg);
+            let distance = paradox.measure(plant.time_s, &plant.theta_rad, plant.p_per_kg);
             if distance.p_ratio <= 0.0 {
                 flags |= flag::PARADOX;
             } else {

@@ -384,7 +384,9 @@ fn to_edge_m(scenario: &Scenario, result: &LoopResult) -> Option<f64> {
         return None;
     }
     let direction = scenario.target_m()? - result.final_reference_m?;
+    let time_s = result.ticks as f64 / f64::from(scenario.run.tick_hz);
     ParadoxDistance::new(scenario).ok()?.before_edge_m(
+        time_s,
         &result.final_theta_rad,
         result.final_p_per_kg,
         direction,

@@ -83,7 +83,9 @@ impl Follower {
         let paradox = self.paradox.as_mut();
         Followed {
             travel_m: self.travel_m,
-            paradox: paradox.map_or(unknown, |paradox| paradox.measure(theta_rad, p_per_kg)),
+            paradox: paradox.map_or(unknown, |paradox| {
+                paradox.measure(time_s, theta_rad, p_per_kg)
+            }),
         }
     }
 
