@@ -229,9 +229,38 @@ pub fn run(arguments: &RunArguments) -> Result<(), CommandError> {
         serial::check(port)?;
     }
     let interrupt = Interrupt::catch()?;
+    let (mut plant, mut controller) = start(arguments, &scenario)?;
+
+    let status = watch(
+        &mut plant,
+        &mut controller,
+        arguments.patience.peer(),
+        &interrupt,
+    )?;
+    let report = report(&mut plant, &mut controller, status)?;
+    if !arguments.quiet {
+        plant::print(&report, arguments.json)?;
+    }
+    if let Some(missed) = report.missed_deadlines.filter(|missed| *missed > 0) {
+        warn(format_args!(
+            "real time was missed: {missed} of {} ticks came a whole tick or more late; end other programs \
+             or lower run.tick_hz",
+            report.ticks
+        ));
+    }
+    if is_told(status) {
+        return Err(failure(status));
+    }
+    fail_on::check(&arguments.fail_on, &report)
+}
+
+/// Starts the processes of plant and controller.
+fn start(
+    arguments: &RunArguments,
+    scenario: &Scenario,
+) -> Result<(RunProcess, RunProcess), CommandError> {
     let bus = arguments.bus.clone().unwrap_or_else(BusName::unique);
     let pair = Pair::unique();
-
     let plan = Plan::Plant(PlantArguments {
         scenario: arguments.scenario.clone(),
         bus: bus.clone(),
@@ -259,26 +288,24 @@ pub fn run(arguments: &RunArguments) -> Result<(), CommandError> {
         pair: Some(pair),
         quiet: arguments.quiet,
     };
-    let mut controller = RunProcess::start(&controller_plan(arguments, &scenario, join), stderr)?;
+    let controller = RunProcess::start(&controller_plan(arguments, scenario, join), stderr)?;
+    Ok((plant, controller))
+}
 
-    let status = watch(
-        &mut plant,
-        &mut controller,
-        arguments.patience.peer(),
-        &interrupt,
-    )?;
-    // After these, the plant has printed why, and its report if the run is complete.
-    let is_told = [DEADLINES_MISSED, UNWRITABLE]
-        .into_iter()
-        .any(|code| status.code() == Some(i32::from(code)));
-    if !status.success() && !is_told {
+/// Returns the report of a plant that has ended, once the controller has ended, too.
+fn report(
+    plant: &mut RunProcess,
+    controller: &mut RunProcess,
+    status: ExitStatus,
+) -> Result<RunReport, CommandError> {
+    if !status.success() && !is_told(status) {
         if status.code() == Some(i32::from(PEER_FAILED)) {
-            return Err(peer_failure(&mut plant, &mut controller, status)?);
+            return Err(peer_failure(plant, controller, status)?);
         }
         return Err(failure(status));
     }
     let text = plant.stdout.text();
-    if is_told && text.is_empty() {
+    if is_told(status) && text.is_empty() {
         return Err(failure(status));
     }
     match controller.wait(CONTROLLER_END)? {
@@ -297,21 +324,14 @@ pub fn run(arguments: &RunArguments) -> Result<(), CommandError> {
     if !remarks.is_empty() {
         warn(remarks.trim_end());
     }
-    let report: RunReport = serde_json::from_str(&text).map_err(ProcessError::NoReport)?;
-    if !arguments.quiet {
-        plant::print(&report, arguments.json)?;
-    }
-    if let Some(missed) = report.missed_deadlines.filter(|missed| *missed > 0) {
-        warn(format_args!(
-            "real time was missed: {missed} of {} ticks came a whole tick or more late; end other programs \
-             or lower run.tick_hz",
-            report.ticks
-        ));
-    }
-    if is_told {
-        return Err(failure(status));
-    }
-    fail_on::check(&arguments.fail_on, &report)
+    Ok(serde_json::from_str(&text).map_err(ProcessError::NoReport)?)
+}
+
+/// Whether the plant has printed why it failed, and its report if the run is complete.
+fn is_told(status: ExitStatus) -> bool {
+    [DEADLINES_MISSED, UNWRITABLE]
+        .into_iter()
+        .any(|code| status.code() == Some(i32::from(code)))
 }
 
 /// Warns of a model that a rehearsal has identified: the arm that it simulated is not the one that runs.

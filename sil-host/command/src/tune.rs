@@ -84,16 +84,7 @@ fn search(arguments: &TuneArguments) -> Result<(), CommandError> {
     let held = AtomicFile::create(&arguments.table).map_err(output)?;
     held.check_alone().map_err(output)?;
     let given = tuning.score(&tuning.scenario, tuning.cases, tuning.seed)?;
-    let all = arguments.trials as usize;
-    let mut trials = continued(&arguments.table, &tuning, &given, all)?;
-    let progress = progress(all, trials.len());
-    while trials.len() < all {
-        trials.extend(tuning.next_trials(&trials, all, &given)?);
-        go_on(&interrupt)?;
-        progress.set_position(trials.len() as u64);
-        atomic_file::write(&arguments.table, &table(&tuning, &trials)?).map_err(output)?;
-    }
-    progress.finish_and_clear();
+    let trials = searched(arguments, &tuning, &given)?;
     let best = trials
         .iter()
         .min_by(|one, other| one.cost.total_cmp(&other.cost));
@@ -130,15 +121,7 @@ fn search(arguments: &TuneArguments) -> Result<(), CommandError> {
         "held_out_given": held_out[0], "held_out_tuned": held_out[1],
         "files": files,
     });
-    let mut lines = terminal::table([
-        "",
-        "kept",
-        "error (mm)",
-        "ripple (N)",
-        "torque change (N·m)",
-        "cost",
-    ]);
-    for (name, score, cost) in [
+    let lines = compared([
         ("given", &given, given.cost(&given)),
         ("tuned", &best.score, best.cost),
         (
@@ -147,13 +130,7 @@ fn search(arguments: &TuneArguments) -> Result<(), CommandError> {
             held_out[0].cost(&held_out[0]),
         ),
         ("tuned, unseen cases", &held_out[1], held_out_cost),
-    ] {
-        let numbers = [score.error_mm, score.ripple_n, score.torque_change_nm, cost]
-            .map(|number| format!("{number:.4}"));
-        let mut cells = vec![name.to_owned(), format!("{:.0} %", 100.0 * score.kept)];
-        cells.extend(numbers);
-        lines.add_row(cells);
-    }
+    ]);
     let keys: String = keys
         .map(|(key, value)| format!("\n{key} = {value:.6}"))
         .collect();
@@ -162,7 +139,6 @@ fn search(arguments: &TuneArguments) -> Result<(), CommandError> {
     } else {
         "not better: keep the given settings"
     };
-    let lines = terminal::readable_table(lines);
     arguments.json.say(
         &result,
         format_args!(
@@ -170,6 +146,45 @@ fn search(arguments: &TuneArguments) -> Result<(), CommandError> {
             arguments.out.display()
         ),
     )
+}
+
+/// Returns all trials of a search, and writes their table after each batch.
+fn searched(
+    arguments: &TuneArguments,
+    tuning: &Tuning,
+    given: &Score,
+) -> Result<Vec<Trial>, CommandError> {
+    let all = arguments.trials as usize;
+    let mut trials = continued(&arguments.table, tuning, given, all)?;
+    let progress = progress(all, trials.len());
+    while trials.len() < all {
+        trials.extend(tuning.next_trials(&trials, all, given)?);
+        go_on(&tuning.interrupt)?;
+        progress.set_position(trials.len() as u64);
+        atomic_file::write(&arguments.table, &table(tuning, &trials)?).map_err(output)?;
+    }
+    progress.finish_and_clear();
+    Ok(trials)
+}
+
+/// Returns scores with their costs as a table.
+fn compared(rows: [(&str, &Score, f64); 4]) -> String {
+    let mut lines = terminal::table([
+        "",
+        "kept",
+        "error (mm)",
+        "ripple (N)",
+        "torque change (N·m)",
+        "cost",
+    ]);
+    for (name, score, cost) in rows {
+        let numbers = [score.error_mm, score.ripple_n, score.torque_change_nm, cost]
+            .map(|number| format!("{number:.4}"));
+        let mut cells = vec![name.to_owned(), format!("{:.0} %", 100.0 * score.kept)];
+        cells.extend(numbers);
+        lines.add_row(cells);
+    }
+    terminal::readable_table(lines)
 }
 
 /// Refuses a key that is given twice: only the last of its values would count.
