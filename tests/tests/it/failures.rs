@@ -294,7 +294,7 @@ fn killing_a_run_ends_its_processes() {
 fn killing_a_run_with_capabilities_ends_its_processes() {
     const NOBODY: u32 = 65534;
     let bench = Bench::new("capable");
-    let copy = bench.path("painleve");
+    let copy = bench.path("capable");
     std::fs::copy(program(), &copy).unwrap();
     let mut setcap = Command::new("setcap");
     let capable = setcap.arg("cap_sys_nice+ep").arg(&copy).output();
@@ -316,6 +316,7 @@ fn killing_a_run_with_capabilities_ends_its_processes() {
     let id = run.id().cast_signed();
     let children = ["plant", "controller"].map(|name| child_of(id, name));
     std::thread::sleep(Duration::from_millis(400));
+    assert!(children.into_iter().all(is_running));
     signal(id, Signal::SIGKILL);
     run.wait().unwrap();
     let start = std::time::Instant::now();
@@ -324,7 +325,7 @@ fn killing_a_run_with_capabilities_ends_its_processes() {
     }
     let left = children.into_iter().filter(|child| is_running(*child));
     let left: Vec<_> = left
-        .inspect(|child| signal(*child, Signal::SIGKILL))
+        .inspect(|child| signal(*child, Signal::SIGTERM))
         .collect();
     assert!(left.is_empty(), "left running: {left:?}");
 }
