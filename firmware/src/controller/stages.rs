@@ -58,10 +58,8 @@ impl<L: Law> Controller<L> {
         let mut flags = StatusFlags::default();
         flags.set(StatusFlags::CONTACT, touches);
         flags.set(StatusFlags::SATURATED, command.saturated);
-        flags.set(
-            StatusFlags::REFERENCE_DONE,
-            self.references.generator.is_done(),
-        );
+        let is_done = self.references.generator.is_done();
+        flags.set(StatusFlags::REFERENCE_DONE, is_done);
         flags.set(StatusFlags::AT_EDGE, target.at_edge);
         flags.set(StatusFlags::RECOVERING, target.recovering && drives);
         flags.set(StatusFlags::SLIP_NEGATIVE, slips);
@@ -70,10 +68,7 @@ impl<L: Law> Controller<L> {
         self.supervisor.report(answer);
         show(estimates, &target, command);
         // Readings from which the estimates have started show nothing else.
-        self.due = match followed {
-            Ok(()) => Due::Everything,
-            Err(_) => Due::Preparation,
-        };
+        self.due = followed.map_or(Due::Preparation, |()| Due::Everything);
     }
 
     /// Updates the estimates with the tick that has been answered, and the slow ones and the edges in turn.

@@ -139,10 +139,8 @@ impl EdgeGovernor {
     ) {
         let reach = USABLE_REACH * arm.reach_on_belt_m();
         if self.searched_for != Some((posture, landing_p_ratio)) {
-            if self
-                .searched_for
-                .is_none_or(|(before, _)| before != posture)
-            {
+            let before = self.searched_for.map(|(before, _)| before);
+            if before != Some(posture) {
                 // Farther from the tip nothing is known: a reference that went there might not stop at the edge.
                 self.stretch = Stretch {
                     lower_m: tip_t_m - NEAR_M,
