@@ -118,7 +118,8 @@ fn table(
             .iter()
             .rev()
             .fold(0_u32, |sum, byte| sum << 8 | u32::from(*byte));
-        let target = start + 2 * half_words;
+        // From the program counter, wherever the table is (ARMv7-M, TBB).
+        let target = branch.address + branch.size + 2 * half_words;
         // Padding and literals may follow the table. No entry leads into them, or into another function.
         if target < end || image.name(target) != image.name(at) {
             break;
@@ -268,7 +269,7 @@ mod tests {
         code.extend([0x00, 0xbf]); // nop
         code.extend([0xd0, 0xe8, 0x01, 0xf0]); // tbb [r0, r1]
         code.extend([0x00; 4]); // 0.0
-        code.extend([2, 3]);
+        code.extend([4, 5]); // half-words behind the branch, not behind the table
         code.extend([0x00, 0xbf]);
         code.extend([0x70, 0x47].repeat(4)); // bx lr
         let mut image = Image::of_code(0x100, &code, "switch");
