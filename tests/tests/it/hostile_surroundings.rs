@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 use nix::sys::signal::Signal;
 use nix::sys::stat::Mode;
 use nix::unistd::mkfifo;
-use painleve_tests::{Bench, child_of, code, errors, is_running, signal};
+use painleve_tests::{Bench, Running, child_of, code, errors, is_running, signal};
 use serde_json::Value;
 
 const SOON: Duration = Duration::from_secs(5);
@@ -373,15 +373,20 @@ fn an_interrupted_export_leaves_nothing() {
     for format in ["--csv=new.csv", "--ros2=new.mcap"] {
         let running = bench.start(&["export", "run.mcap", format]);
         let is_written = || bench.files().len() > before.len();
-        while !is_written() && is_running(running.id()) {
-            std::thread::sleep(Duration::from_millis(1));
-        }
-        signal(running.id(), Signal::SIGINT);
-        let (output, _) = running.end(SOON);
-        assert_eq!(code(output.status), 130, "{output:?}");
-        assert_eq!(errors(&output), "error: interrupted\n");
+        interrupt_once(running, is_written);
         assert_eq!(bench.files(), before);
     }
+}
+
+/// Interrupts a command at work, as Ctrl-C does.
+fn interrupt_once(running: Running, is_at_work: impl Fn() -> bool) {
+    while !is_at_work() && is_running(running.id()) {
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    signal(running.id(), Signal::SIGINT);
+    let (output, _) = running.end(SOON);
+    assert_eq!(code(output.status), 130, "{output:?}");
+    assert_eq!(errors(&output), "error: interrupted\n");
 }
 
 #[test]
@@ -413,13 +418,7 @@ fn an_export_that_finds_nothing_to_write_can_be_interrupted() {
             let mut files = open.filter_map(|it| fs::read_link(it.path()).ok());
             files.any(|file| file == path)
         };
-        while !is_read() && is_running(running.id()) {
-            std::thread::sleep(Duration::from_millis(1));
-        }
-        signal(running.id(), Signal::SIGINT);
-        let (output, _) = running.end(SOON);
-        assert_eq!(code(output.status), 130, "{output:?}");
-        assert_eq!(errors(&output), "error: interrupted\n");
+        interrupt_once(running, is_read);
         assert_eq!(bench.files(), ["foreign.mcap"]);
     }
 }
